@@ -36,8 +36,8 @@ pub struct ColliderBoxes {
 pub(crate) struct Slot {
     pub(crate) key: ColliderTreeProxyKey,
     pub(crate) collider: Entity,
-    /// The proxy moved in this update, by avian's list.
-    pub(crate) has_moved: bool,
+    /// Where the proxy is in avian's list of those that moved in this update.
+    pub(crate) moved: Option<u32>,
 }
 
 impl Slot {
@@ -73,7 +73,7 @@ impl ColliderBoxes {
             error!("pbig: {}; some pairs that began in this step are not found yet", in_words(&error));
         }
         let events = self.broad_phase.events();
-        let has_moved = |id: u32| self.slots[id as usize].has_moved;
+        let has_moved = |id: u32| self.slots[id as usize].moved.is_some();
         events.removed.iter().flat_map(ends).for_each(|end| _ = self.waiting.remove(&end));
         let again = waiting_of_moved(&self.waiting, &self.moved, has_moved);
         again.iter().flat_map(ends).for_each(|end| _ = self.waiting.remove(&end));
@@ -86,12 +86,12 @@ impl ColliderBoxes {
     /// Sets the boxes of moved proxies. Colliders that have lost their contacts begin anew: their boxes are removed, and set again
     /// where they still have a proxy.
     fn follow(&mut self, trees: &ColliderTrees, moved: &MovedProxies, keys: &Keys) -> Result<(), Error> {
-        self.moved.drain(..).for_each(|id| self.slots[id as usize].has_moved = false);
+        self.moved.drain(..).for_each(|id| self.slots[id as usize].moved = None);
         let lost = std::mem::take(&mut self.lost);
         lost.iter().for_each(|&collider| self.remove(collider));
-        let anew = |collider| Some(Slot { key: *keys.get(collider).ok()?, collider, has_moved: false });
-        let at = |&key| Some(Slot { key, collider: trees.get_proxy(key)?.collider, has_moved: true });
-        let slots = lost.into_iter().filter_map(anew).chain(moved.proxies().iter().filter_map(at));
+        let anew = |collider| Some(Slot { key: *keys.get(collider).ok()?, collider, moved: None });
+        let at = |(at, &key)| Some(Slot { key, collider: trees.get_proxy(key)?.collider, moved: Some(at) });
+        let slots = lost.into_iter().filter_map(anew).chain((0..).zip(moved.proxies()).filter_map(at));
         // Avian names each proxy once. So the others are set even if one of them fails.
         slots.map(|slot| self.set(trees, slot)).reduce(Result::and).unwrap_or(Ok(()))
     }
@@ -101,7 +101,7 @@ impl ColliderBoxes {
         let aabb = trees.tree_for_type(slot.key.tree_type()).get_proxy_aabb(slot.key.id());
         let Some((proxy, aabb)) = slot.proxy(trees).zip(aabb) else { return Ok(()) };
         let id = self.store(slot);
-        if slot.has_moved {
+        if slot.moved.is_some() {
             self.moved.push(id);
         }
         self.broad_phase.set(id, Aabb::new(aabb.min.into(), aabb.max.into()), filter(slot.key, proxy))
@@ -190,7 +190,7 @@ mod tests {
 
     fn set(boxes: &mut ColliderBoxes, index: u32, place: u32) -> u32 {
         let key = ColliderTreeProxyKey::PLACEHOLDER;
-        let id = boxes.store(Slot { key, collider: collider(index), has_moved: false });
+        let id = boxes.store(Slot { key, collider: collider(index), moved: None });
         let aabb = Aabb::from_center([2.0 * place as f32, 0.0, 0.0], [0.5; 3]);
         boxes.broad_phase.set(id, aabb, ProxyFilter::ALL).expect("a box");
         id

@@ -47,15 +47,16 @@ where
     }
 
     /// Returns the proxies of a pair, if avian would look at the pair in this update. In its order: of two that look, the one with the
-    /// lower key is the first. (Avian finds a sensor that looks from both sides, in the order of its list of moved proxies.)
+    /// lower key is the first. But a sensor that looks keeps its place in the list of moved proxies.
     fn proxies(&self, mut slots: [Slot; 2]) -> Option<[&'w ColliderTreeProxy; 2]> {
         // The proxies outlive the borrow of `self`.
         let trees = Res::clone(&self.trees).into_inner();
         slots.sort_unstable_by_key(|slot| (slot.key.tree_type() as u8, slot.key.id()));
         let [one, other] = slots.map(|slot| Some((slot, slot.proxy(trees)?)));
         let (one, other) = (one?, other?);
-        let orders = [[one, other], [other, one]];
-        orders.into_iter().find(looks).map(|order| order.map(|(_, proxy)| proxy))
+        let is_turned = other.1.is_sensor() && other.0.moved < one.0.moved;
+        let (first, second) = if is_turned { (other, one) } else { (one, other) };
+        [[first, second], [second, first]].into_iter().find(looks).map(|order| order.map(|(_, proxy)| proxy))
     }
 
     /// Returns true if no joint and no hook forbids the contact.
@@ -72,7 +73,7 @@ where
 
 /// Returns true if the first proxy has moved, and avian searches the tree of the second one for it.
 fn looks([(slot, proxy), (other, _)]: &[(Slot, &ColliderTreeProxy); 2]) -> bool {
-    slot.has_moved && (!slot.key.is_static() || proxy.is_sensor() || !other.key.is_static())
+    slot.moved.is_some() && (!slot.key.is_static() || proxy.is_sensor() || !other.key.is_static())
 }
 
 /// Adds contacts for the pairs that pbig finds.

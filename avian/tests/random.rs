@@ -107,13 +107,11 @@ fn contacts_are_in_the_same_order_each_time() {
     assert_eq!(contacts(), contacts());
 }
 
-/// Returns the contacts of numbered bodies by their numbers, the lower one first. Sensors are left out: if both colliders have moved,
-/// avian finds such a pair from both, and which one is first depends on its list of moved proxies.
+/// Returns the contacts of numbered bodies by their numbers, the lower one first.
 fn ends_by_pair(app: &App) -> HashMap<[Number; 2], [Number; 2]> {
     let graph = app.world().resource::<ContactGraph>();
     let pairs = graph.active_pairs().iter().chain(graph.sleeping_pairs());
-    let is_sensor = |collider| app.world().get::<Sensor>(collider).is_some();
-    let number = |collider| app.world().get::<Number>(collider).copied().filter(|_| !is_sensor(collider));
+    let number = |collider| app.world().get::<Number>(collider).copied();
     let ends = pairs.filter_map(|pair| Some([number(pair.collider1)?, number(pair.collider2)?]));
     ends.map(|ends| ([ends[0].min(ends[1]), ends[0].max(ends[1])], ends)).collect()
 }
