@@ -1,7 +1,10 @@
 //! The work of a call is bounded for every shape, motion and history of boxes: counts, never times.
 
 use pbig_core::{BroadPhase, Config, Engine, Finder, ProxyFilter, WORK_LIMIT, oracle};
-use pbig_harness::hard::{History, Part, Recipe, histories, ratio, ratio_of_search, shapes, tell};
+use pbig_harness::hard::{
+    Change, History, Part, Placement, Recipe, histories, ratio, ratio_of_history, ratio_of_search, shapes,
+    tell,
+};
 
 /// Numbers of boxes, too many for a sweep: a work that is not bounded grows faster than they do.
 const SIZES: [usize; 2] = [5000, 20_000];
@@ -88,18 +91,42 @@ fn a_grid_alone_breaks_the_bound() {
     assert!(large > MAX_GROWTH * small && large > WORK_LIMIT as f64, "{small}, {large}");
 }
 
-/// The world is hard with 10,000 boxes, not with 9000 or 11,000.
+/// The world is hard with 10,000 boxes, not with 9000 or 11,000. A sample of oversize boxes that leaves out the rows of cells
+/// which they cross promises an eighth of the work in a grid.
 #[test]
-fn tiny_tiles_among_sheets_are_below_the_bound() {
+fn rows_of_empty_cells_count_in_a_sample() {
     let name = "tiny tiles among sheets";
     let (_, recipe) = shapes().into_iter().find(|shape| shape.0 == name).expect("a shape");
     let ratio = ratio_of_search(&recipe, 10_000).expect("few pairs");
-    assert!(ratio <= WORK_LIMIT as f64, "{name}: {ratio}");
+    assert!(ratio < 2.0, "{name}: {ratio}");
+}
+
+/// A lattice becomes a crowd of small boxes by a hundredth with each update.
+#[test]
+fn the_worst_world_that_was_found_is_below_the_bound() {
+    let lattice = |corner: [f32; 3], width: [f32; 3], half: [f32; 3]| Part {
+        place: Placement::Lattice,
+        corner,
+        width,
+        half,
+        ..Part::CUBES
+    };
+    let half = [0.122913085, 0.11091662, 0.030154584];
+    let start = vec![
+        lattice([7.4467387, 0.0, 0.0], [51.744076, 4.957684, 194.29459], half),
+        Part {
+            weight: 16,
+            decades: 0.04787731,
+            ..lattice([67.513016, 0.0, 0.0], [461.54355, 186.19568, 74.324615], half)
+        },
+    ];
+    let (width, half) = ([0.2094951, 0.27268264, 0.123041265], [0.001342344, 0.0034893274, 0.001342344]);
+    let change = Change::To(Recipe(vec![Part { decades: 0.60838604, ..lattice([0.0; 3], width, half) }]));
+    let history = History { start: Recipe(start), change, updates: 100 };
+    let ratio = ratio_of_history(&history, 10_000).expect("few pairs");
+    assert!(ratio <= WORK_LIMIT as f64, "{ratio}");
     // Elsewhere powers are rounded in another way.
-    assert!(
-        !cfg!(target_os = "linux") || (ratio - 54.4).abs() < 0.1,
-        "{name}: {ratio}, not as in docs/STRESS.md"
-    );
+    assert!(!cfg!(target_os = "linux") || (ratio - 52.4).abs() < 0.1, "{ratio}, not as in docs/STRESS.md");
 }
 
 /// Runs a history, and returns the largest ratio of an update, and the largest work besides one and a half times a search's.

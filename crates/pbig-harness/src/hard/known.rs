@@ -131,8 +131,7 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
             "needles in a thin world",
             &[at([0.47, 1.3, 0.0], mixed(2.1, line([0.02, 2200.0, 0.01], [8e-7, 3000.0, 55.0])))],
         ),
-        // The worst one that a search has found, with 10,000 boxes: a sample promises less work in a grid than there is. Fewer digits
-        // make another world.
+        // Found by search: with 10,000 boxes the oversize ones cross many rows of empty cells. Fewer digits make another world.
         (
             "tiny tiles among sheets",
             &[
