@@ -23,16 +23,22 @@ pub(super) fn sort_into(
 ) {
     let (len, to) = (range.len(), &mut to[range.start..]);
     if len > MEDIUM {
-        long.sort(&from[range], &mut to[..len]);
-    } else if len > SHORT {
-        sort_by_counting(&from[range.start..], len, &mut to[..len]);
-    } else if let Some(eight) = from[range.start..].first_chunk() {
-        let sorted = simd.sorted_short(eight, len);
-        match to.first_chunk_mut() {
-            Some(to) => *to = sorted,
-            None => to[..len].copy_from_slice(&sorted[..len]),
-        }
+        return long.sort(&from[range], &mut to[..len]);
     }
+    if len > SHORT {
+        return sort_by_counting(&from[range.start..], len, &mut to[..len]);
+    }
+    let sorted = simd.sorted_short(first_eight(&from[range.start..]), len);
+    match to.first_chunk_mut() {
+        Some(to) => *to = sorted,
+        None => to[..len].copy_from_slice(&sorted[..len]),
+    }
+}
+
+/// Borrows the first elements of a row, and those behind it.
+#[inline(always)]
+fn first_eight(row: &[u32]) -> &[u32; SHORT] {
+    row.first_chunk().expect("a register of elements is behind all rows")
 }
 
 /// Sorts the first `len` of some ids, eight at a time: the place of each is the number of lesser ones.
@@ -40,8 +46,7 @@ pub(super) fn sort_into(
 fn sort_by_counting(from: &[u32], len: usize, to: &mut [u32]) {
     let row = &from[..len];
     for first in (0..len).step_by(SHORT) {
-        let Some(eight) = from[first..].first_chunk::<SHORT>() else { break };
-        let mut lesser = [0u32; SHORT];
+        let (eight, mut lesser) = (first_eight(&from[first..]), [0u32; SHORT]);
         for id in row {
             for lane in 0..SHORT {
                 lesser[lane] += u32::from(*id < eight[lane]);
