@@ -306,6 +306,46 @@ fn ratio_between(recipe: &Recipe, n: usize, division: Division, engine: Option<E
     ratio(finder.report())
 }
 
+/// Returns the places of a list at which work is counted before a search of a grid: one in 32.
+fn counted(len: usize) -> Vec<bool> {
+    let mut is_counted = vec![false; len];
+    for first in (0..len).step_by(32) {
+        let hash = (first as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32;
+        is_counted.get_mut(first + ((hash * 32) >> 32) as usize).into_iter().for_each(|is| *is = true);
+    }
+    is_counted
+}
+
+/// Rods in two directions share their cells, and miss each other. In the order of the input, the work of none of them would be counted.
+#[test]
+fn the_order_of_boxes_does_not_hide_their_work() {
+    let mut random = StdRng::seed_from_u64(12);
+    let mut at = |low: [f32; 3], width: [f32; 3]| -> [f32; 3] {
+        std::array::from_fn(|k| low[k] + width[k] * random.random::<f32>())
+    };
+    let rod = |[x, y, z]: [f32; 3], axis: usize| {
+        let long = |k: usize| if k == axis { 1.0 } else { 1e-5 };
+        Aabb::new([x, y, z], [x + long(0), y + long(1), z + long(2) * 0.01])
+    };
+    let a: Vec<Aabb> = counted(3000)
+        .into_iter()
+        .map(|is_counted| {
+            if is_counted {
+                Aabb::from_center(at([5.5, 0.5, 0.5], [1.0; 3]), [0.5; 3])
+            } else {
+                rod(at([0.0; 3], [0.0, 1.0, 0.8]), 0)
+            }
+        })
+        .collect();
+    let mut b: Vec<Aabb> = (0..20_000).map(|_| rod(at([0.0, 0.0, 0.001], [1.0, 0.0, 0.8]), 1)).collect();
+    // The sample of the set sees boxes only that the other set reaches.
+    b[10_000] = Aabb::new([5.0, 0.0, 0.0], [6.5, 1.5, 1.5]);
+    let mut finder = Finder::default();
+    let found = finder.find_between(&a, &b).expect("few pairs").to_vec();
+    assert!(found == oracle::pairs_between(&a, &b));
+    assert!(ratio(finder.report()) < 2.0, "{:?}", finder.report());
+}
+
 #[test]
 fn no_two_sets_take_work_without_bound() {
     for engine in [None, Some(Engine::Tree)] {

@@ -1,5 +1,8 @@
 //! A set of ids that is listed in time that follows its members, not the ids.
 
+/// Maximum distance of ids, plus one, that are sorted by bits: these fit the nearest cache. Beyond, comparisons take less time.
+const SORTED_BELOW: u32 = 1 << 18;
+
 /// A bit for each id, and above them a bit for each word of 64 ids: a million ids without a member are 250 words to read.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct IdSet {
@@ -29,22 +32,26 @@ impl IdSet {
         self.words[word / 64] |= 1 << (word % 64);
     }
 
-    /// Sorts ids of which no two are equal, into `to`. The set is empty before and after.
+    /// Sorts ids of which no two are equal, into `to`. The set is empty before and after, and knows each id by its distance from the
+    /// lowest one.
     #[inline(always)]
     pub(crate) fn sort(&mut self, ids: &[u32], to: &mut [u32]) {
         let (first, last) = ids.iter().fold((u32::MAX, 0), |(low, high), id| (low.min(*id), high.max(*id)));
-        if self.bits.len() * 64 <= last as usize {
-            self.reserve(last as usize + 1);
+        if last.saturating_sub(first) >= SORTED_BELOW {
+            to.copy_from_slice(ids);
+            return to.sort_unstable();
         }
+        self.reserve(SORTED_BELOW as usize);
         for id in ids {
-            self.bits[*id as usize / 64] |= 1 << (id % 64);
-            self.words[*id as usize / 4096] |= 1 << (id / 64 % 64);
+            let at = (id - first) as usize;
+            self.bits[at / 64] |= 1 << (at % 64);
+            self.words[at / 4096] |= 1 << (at / 64 % 64);
         }
         let mut to = to.iter_mut();
-        for at in first as usize / 4096..=last as usize / 4096 {
+        for at in 0..=last.saturating_sub(first) as usize / 4096 {
             for word in ones(at, std::mem::take(&mut self.words[at])) {
                 let members = ones(word as usize, std::mem::take(&mut self.bits[word as usize]));
-                members.zip(&mut to).for_each(|(id, to)| *to = id);
+                members.zip(&mut to).for_each(|(id, to)| *to = first + id);
             }
         }
     }
@@ -103,8 +110,10 @@ mod tests {
     #[test]
     fn ids_are_sorted_anywhere_and_leave_the_set_empty() {
         let mut set = IdSet::default();
-        for (len, step) in [(0, 1), (1, 1), (300, 1), (300, 63), (300, 64), (300, 4097), (5000, 7)] {
-            for first in [0, 5, 100_000] {
+        for (len, step) in
+            [(0, 1), (1, 1), (300, 1), (300, 63), (300, 64), (300, 800), (300, 4097), (5000, 7)]
+        {
+            for first in [0, 5, 100_000, u32::MAX - 2_000_000] {
                 let sorted: Vec<u32> = (0..len).map(|i| first + i * step).collect();
                 let ids: Vec<u32> = (0..len).map(|i| first + (i * 7919 % len) * step).collect();
                 let mut to = vec![0; len as usize];

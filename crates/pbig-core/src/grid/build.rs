@@ -11,6 +11,7 @@ use super::simd::{BLOCK, Simd, dispatch};
 use super::spacing::GridPlan;
 use crate::Aabb;
 use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run};
+use crate::policy::search as policy;
 use std::ops::Range;
 
 /// Maximum number of buckets of the first sort: their write positions stay in the nearest cache.
@@ -157,13 +158,25 @@ impl Grid {
     }
 }
 
+impl Grid {
+    /// Returns a number of tests that no box that is searched for exceeds, of those in the grid's cells.
+    fn most_tests(&self) -> u64 {
+        let Cells { shift, reach, .. } = self.plan.cells;
+        let in_window = (0..3).map(|k| ((2 * reach[k] as u64) >> shift) + 2).product::<u64>();
+        let starts = &self.starts[..=self.plan.cells.count()];
+        let fullest = starts.windows(2).map(|cell| cell[1] - cell[0]).max().unwrap_or(0);
+        in_window * u64::from(fullest)
+    }
+}
+
 /// The grids of two sets.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TwoGrids([Grid; 2]);
 
 impl TwoGrids {
     /// Sorts the valid boxes of two sets, of which the second has the ids behind the first's, each into a grid. Boxes that are
-    /// searched for stay in their buckets, near those that they meet, unless an oversize box of the other set meets them in cells.
+    /// searched for stay in their buckets, near those that they meet, unless an oversize box of the other set meets them in cells, or
+    /// cells are full: then the work is counted for some slots, and neighbours have to be alike.
     pub(crate) fn build(&mut self, plan: GridPlan, boxes: [&[Aabb]; 2], workers: usize) -> Sorted<'_> {
         let [first, second] = &mut self.0;
         let first_split = first.bring_into_buckets(plan, boxes[0], 0, workers);
@@ -173,7 +186,7 @@ impl TwoGrids {
         let ((own, own_split), (other, split)) =
             if is_first_smaller { (first, second) } else { (second, first) };
         other.sort_buckets(split, workers);
-        if other.oversize.is_empty() {
+        if other.oversize.is_empty() && other.most_tests() <= policy::UNSORTED_UP_TO_TESTS {
             std::mem::swap(&mut own.records, &mut own.coarse);
         } else {
             own.sort_buckets(own_split, workers);

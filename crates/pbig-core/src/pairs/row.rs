@@ -166,9 +166,9 @@ mod tests {
     #[test]
     fn rows_of_every_length_are_sorted_at_the_end_of_their_list_too() {
         for len in 1..300 {
-            // High ones where no set of bits would take memory for the ids below.
-            let base = if len > MEDIUM { 0 } else { u32::MAX - 400_000 };
-            let id = |i: usize| base + (i * 7919 % len) as u32 * 1021 + u32::from(i.is_multiple_of(3));
+            let id = |i: usize| {
+                u32::MAX - 500_000 + (i * 7919 % len) as u32 * 1021 + u32::from(i.is_multiple_of(3))
+            };
             let rows: Vec<Vec<u32>> =
                 (0..3).map(|row| (0..len).map(|i| id(i) + row * 50_000).collect()).collect();
             // Behind the rows, numbers of no row.
