@@ -84,7 +84,11 @@ fn a_few_invalid_and_far_boxes_among_many() {
     ];
     for (seed, sizes) in [[3000, 3000], [10, 3000], [3000, 70]].into_iter().enumerate() {
         for odd in odd {
-            let [mut a, mut b] = sizes.map(|n| set("unit", n, seed as u64 + n as u64));
+            let [mut a, mut b] = [0, 1].map(|side| set("unit", sizes[side], 10 * seed as u64 + side as u64));
+            // So large that all others are near it.
+            [&mut a, &mut b].into_iter().filter(|set| set.len() < 100).for_each(|set| {
+                set[0] = Aabb::from_center([0.0; 3], [1e4; 3]);
+            });
             for at in 700..703 {
                 a.get_mut(at).into_iter().chain(b.get_mut(at)).for_each(|aabb| *aabb = odd);
             }

@@ -37,8 +37,9 @@ impl IdSet {
     #[inline(always)]
     pub(crate) fn sort(&mut self, ids: &[u32], to: &mut [u32]) {
         let (first, last) = ids.iter().fold((u32::MAX, 0), |(low, high), id| (low.min(*id), high.max(*id)));
+        // If two ids are equal, the last place keeps one of them.
+        to.copy_from_slice(ids);
         if last.saturating_sub(first) >= SORTED_BELOW {
-            to.copy_from_slice(ids);
             return to.sort_unstable();
         }
         self.reserve(SORTED_BELOW as usize);

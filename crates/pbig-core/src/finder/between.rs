@@ -16,7 +16,7 @@ impl Finder {
     /// sorted by `a`, then `b`.
     ///
     /// Boxes of one set are never compared with each other, so a set may be a crowd. Its boxes that miss all of the other set cost
-    /// a copy and a comparison or two. [`Boxes`] add filters and keys. The CPU does the work; no device is asked.
+    /// a copy and a comparison or two; a few among many are sorted. [`Boxes`] add filters and keys. The CPU does the work; no device is asked.
     ///
     /// ```
     /// use pbig_core::{Aabb, CrossPair, Finder};
@@ -44,7 +44,7 @@ impl Finder {
         bytemuck::cast_slice(&self.pairs_between)
     }
 
-    /// Finds the pairs of two sets, by place in their list, for a receiver or as a list.
+    /// Finds the pairs of two sets, for a receiver or as a list.
     pub(super) fn search_between(
         &mut self,
         a: &Boxes<'_>,
@@ -82,7 +82,7 @@ impl Finder {
         Ok(())
     }
 
-    /// Turns places in the list of both sets into ids.
+    /// Turns the places of a search into ids.
     fn name_ids(&mut self) {
         stage!("emit");
         let mut clock = Clock::start();

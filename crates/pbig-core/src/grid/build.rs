@@ -10,7 +10,7 @@ use super::search::Sorted;
 use super::simd::{BLOCK, Simd, dispatch};
 use super::spacing::GridPlan;
 use crate::Aabb;
-use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run};
+use crate::parallel::{SharedSlice, ensure_scratch, map, piece_range, run};
 use crate::policy::search as policy;
 use std::ops::Range;
 
@@ -19,6 +19,9 @@ const MAX_BUCKETS: usize = 2047;
 
 /// Approximate number of boxes in a bucket: they are sorted within the second cache.
 const BOXES_PER_BUCKET: usize = 2048;
+
+/// Number of cells that a thread looks at together.
+const CELLS_PIECE: usize = 1 << 18;
 
 /// Keys of boxes that are in no cell.
 const OVERSIZE: u32 = u32::MAX;
@@ -162,10 +165,16 @@ impl Grid {
     /// Returns a number of tests that no box that is searched for exceeds, of those in the grid's cells.
     fn most_tests(&self) -> u64 {
         let Cells { shift, reach, .. } = self.plan.cells;
-        let in_window = (0..3).map(|k| ((2 * reach[k] as u64) >> shift) + 2).product::<u64>();
+        // A window has a box and its reach, and a box is shorter than that.
+        let along = |k: usize| (2 * reach[k] as u64 - 1).div_ceil(1 << shift) + 1;
         let starts = &self.starts[..=self.plan.cells.count()];
-        let fullest = starts.windows(2).map(|cell| cell[1] - cell[0]).max().unwrap_or(0);
-        in_window * u64::from(fullest)
+        let pieces = starts.len().div_ceil(CELLS_PIECE);
+        let fullest = map(pieces, |piece| {
+            let cells = &starts[piece * CELLS_PIECE..starts.len().min((piece + 1) * CELLS_PIECE + 1)];
+            cells.windows(2).map(|cell| cell[1] - cell[0]).max().unwrap_or(0)
+        });
+        let fullest = fullest.into_iter().max().unwrap_or(0);
+        (0..3).map(along).product::<u64>() * u64::from(fullest)
     }
 }
 

@@ -48,11 +48,12 @@ use build::BucketCounts;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Grid {
     pub(crate) plan: GridPlan,
-    /// By slot, sorted by cell. Longer than `len`.
+    /// By slot, sorted by cell; where boxes stay in buckets, by bucket. Longer than `len`.
     records: Vec<Record>,
-    /// By slot; tombstones beyond `len`, so that a block can be read anywhere. While the grid is built, the keys of the boxes.
+    /// By slot; tombstones beyond `len`, so that a block can be read anywhere. While the
+    /// grid is built, and where boxes stay in buckets, the keys of the boxes.
     codes: Vec<u64>,
-    /// By cell: its first slot.
+    /// By cell: its first slot. Out of date where boxes stay in buckets.
     starts: Vec<u32>,
     /// Slots in use.
     pub(crate) len: usize,

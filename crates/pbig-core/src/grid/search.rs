@@ -21,10 +21,10 @@ const OVERSIZE_PIECE: usize = 4;
 /// of one set meet each other. Those of two sets lie in two grids of one plan, and no two boxes of a set meet.
 #[derive(Clone, Copy)]
 pub(crate) struct Sorted<'a> {
-    /// The grid whose boxes are searched for: of two, the one with fewer boxes. These lie in their buckets, and in their cells only
-    /// if the other grid has oversize boxes.
+    /// The grid whose boxes are searched for: of two, the one with fewer boxes. These may lie in their buckets only, see
+    /// [`TwoGrids::build`](super::TwoGrids::build).
     pub(super) own: &'a Grid,
-    /// The grid of another set.
+    /// The grid of another set, in whose cells all its boxes lie.
     pub(super) other: Option<&'a Grid>,
 }
 

@@ -45,6 +45,8 @@ fn first_eight(row: &[u32]) -> &[u32; SHORT] {
 #[inline(always)]
 fn sort_by_counting(from: &[u32], len: usize, to: &mut [u32]) {
     let row = &from[..len];
+    // Without effect, unless two ids are equal: then a place is left out, and must not keep an id of another row.
+    to.copy_from_slice(row);
     for first in (0..len).step_by(SHORT) {
         let (eight, mut lesser) = (first_eight(&from[first..]), [0u32; SHORT]);
         for id in row {
@@ -177,6 +179,20 @@ mod tests {
             wanted.iter_mut().for_each(|row| row.sort_unstable());
             assert_eq!(crate::grid::dispatch!(sorted, &pool, len), wanted.concat(), "{len}");
             assert_eq!(sorted(crate::grid::Portable, &pool, len), wanted.concat(), "{len}, portable");
+        }
+    }
+
+    /// A device may name a pair twice.
+    #[test]
+    fn a_row_with_equal_ids_keeps_every_id_and_gets_no_other() {
+        for len in [9, 50, 97, 200] {
+            let ids: Vec<u32> = (0..len).map(|i| 1000 + (i * 7 % (len - 3)) as u32).collect();
+            let pool = [&ids[..], &[0; SHORT]].concat();
+            let mut to = vec![u32::MAX; len];
+            sort_into(crate::grid::Portable, &pool, 0..len, &mut to, &mut IdSet::default());
+            to.sort_unstable();
+            to.dedup();
+            assert!(to.into_iter().eq(1000..1000 + (len as u32 - 3)), "{len}");
         }
     }
 }

@@ -26,7 +26,7 @@ pub(crate) const WORK_OF_ENTRY: u64 = 16;
 const GRID_UP_TO_LOGS_PER_BOX: u64 = 31;
 
 /// Maximum number of tests of any box that is searched for, of two sets, for these boxes to stay unsorted. They are at most half of the
-/// boxes, and from 300 boxes on a grid may take as much: no estimate decides.
+/// boxes, and from 300 boxes on a grid may make as many tests: the estimate of these does not matter.
 pub(crate) const UNSORTED_UP_TO_TESTS: u64 = 512;
 
 /// Number of tests that each overlap of a box justifies: in a crowd each box overlaps many, and a tree is not faster.
