@@ -85,7 +85,7 @@ fn a_few_invalid_and_far_boxes_among_many() {
     for (seed, sizes) in [[3000, 3000], [10, 3000], [3000, 70]].into_iter().enumerate() {
         for odd in odd {
             let [mut a, mut b] = [0, 1].map(|side| set("unit", sizes[side], 10 * seed as u64 + side as u64));
-            // So large that all others are near it.
+            // A small set gets a huge box, so that no box of the other set misses its bounds.
             [&mut a, &mut b].into_iter().filter(|set| set.len() < 100).for_each(|set| {
                 set[0] = Aabb::from_center([0.0; 3], [1e4; 3]);
             });

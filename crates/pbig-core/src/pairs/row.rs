@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Ids of a row that one register holds.
 pub(super) const SHORT: usize = 8;
 
-/// Maximum number of ids of a row that is sorted by counting the lesser ones of each. A set of bits sorts longer ones in less time.
+/// Maximum number of ids of a row that is sorted by counting the lesser ones of each. Longer ones take less time in a set of bits.
 const MEDIUM: usize = 96;
 
 /// Copies the row at `range` of `from` to the same range of `to`, sorted; rows are copied in order, as a short one may
