@@ -1,7 +1,6 @@
 //! AABBs in the precision of a world. The core stores f32; a world in f64 keeps its own boxes beside the core's: see
 //! [`crate::WideBoxes`].
 
-use crate::SceneQuery;
 use pbig_core::{Aabb, BroadPhase, Error, Events, Pair, ProxyFilter};
 use std::fmt::Debug;
 
@@ -99,15 +98,22 @@ pub trait BoxStore<A: Bounds>: Clone + Debug + Default + Send + Sync {
     /// Returns a box of the core in the world's coordinates.
     fn widen(&self, aabb: Aabb) -> A;
 
-    /// Returns a query of the core's boxes that meets at least the boxes that this query meets.
-    fn narrow(&self, query: &SceneQuery<A, A::Real>) -> SceneQuery;
+    /// Returns a box of the core and its velocity that meet, within the narrowed time, at least the boxes that this one meets.
+    fn narrow_motion(&self, start: &A, velocity: &[A::Real; 3]) -> (Aabb, [f32; 3]);
 
-    /// Returns true if a box that the narrowed query meets is one that this query meets, or may be.
-    fn is_met(&self, _query: &SceneQuery<A, A::Real>, _id: u32) -> bool {
+    /// Returns a point of the core that has, within the narrowed distance, at least the boxes that this one has.
+    fn narrow_point(&self, point: &[A::Real; 3]) -> [f32; 3];
+
+    /// Returns a box of the core that overlaps at least the boxes that this one overlaps.
+    fn narrow_box(&self, aabb: &A) -> Aabb;
+
+    /// Returns true if a box that overlaps the narrowed one overlaps this one.
+    #[inline(always)]
+    fn overlaps(&self, _id: u32, _aabb: &A) -> bool {
         true
     }
 
-    /// Returns the bound of the narrowed query, which is not below this bound.
+    /// Returns the time or distance of the narrowed query for this one.
     fn narrow_bound(&self, bound: A::Real) -> f32;
 }
 
@@ -202,8 +208,19 @@ impl BoxStore<Aabb> for CoreBoxes {
         aabb
     }
 
-    fn narrow(&self, query: &SceneQuery) -> SceneQuery {
-        *query
+    #[inline(always)]
+    fn narrow_motion(&self, start: &Aabb, velocity: &[f32; 3]) -> (Aabb, [f32; 3]) {
+        (*start, *velocity)
+    }
+
+    #[inline(always)]
+    fn narrow_point(&self, point: &[f32; 3]) -> [f32; 3] {
+        *point
+    }
+
+    #[inline(always)]
+    fn narrow_box(&self, aabb: &Aabb) -> Aabb {
+        *aabb
     }
 
     #[inline(always)]

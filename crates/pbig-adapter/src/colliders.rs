@@ -7,7 +7,7 @@ use crate::registry::ColliderRegistry;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
 use crate::{Bounds, BoxStore, Handle, HandlePair, Margins, Scene, Tree};
-use pbig_core::{BroadPhase, Error, PairDevice, ProxyFilter};
+use pbig_core::{Aabb, BroadPhase, Error, PairDevice, ProxyFilter};
 use std::collections::HashSet;
 
 /// The numbers of a world.
@@ -116,25 +116,39 @@ impl<T: Tree> Colliders<T> {
     }
 
     /// Visits the indices of colliders whose boxes, margins included, a query meets, and perhaps some that it barely misses.
-    /// `visit` returns the time or distance up to which more are wanted.
-    pub fn visit(&self, query: &QueryOf<T>, visit: &mut dyn FnMut(u32) -> RealOf<T>) {
-        let narrow = self.boxes.narrow(query);
-        self.visit_core(&narrow, &mut |id| {
-            if self.boxes.is_met(query, id) { self.boxes.narrow_bound(visit(id)) } else { f32::INFINITY }
-        });
+    /// `visit` returns the time or distance up to which more are wanted, by the rules of [`pbig_core::BoxIndex::cast_aabb`].
+    #[inline(always)]
+    pub fn visit(&self, query: &QueryOf<T>, mut visit: impl FnMut(u32) -> RealOf<T>) {
+        let boxes = &self.boxes;
+        match query {
+            SceneQuery::Sweep(start, velocity, time) => {
+                let (start, velocity) = boxes.narrow_motion(start, velocity);
+                let time = boxes.narrow_bound(*time);
+                let visit = |id| boxes.narrow_bound(visit(id));
+                self.index.ask(&self.core, |index| index.cast_aabb(&start, velocity, time, visit));
+            }
+            SceneQuery::Near(point, distance) => {
+                let (point, distance) = (boxes.narrow_point(point), boxes.narrow_bound(*distance));
+                let visit = |id| boxes.narrow_bound(visit(id));
+                self.index.ask(&self.core, |index| index.near(point, distance, visit));
+            }
+            SceneQuery::Overlap(aabb) => {
+                let visit = |id| {
+                    if boxes.overlaps(id, aabb) {
+                        visit(id);
+                    }
+                };
+                self.overlapping(&boxes.narrow_box(aabb), visit);
+            }
+        }
     }
 
-    fn visit_core(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> f32) {
-        // Continuous collision detection asks in the middle of a step, when there is a grid of just these boxes.
-        let mut of_grid = Vec::new();
-        if let SceneQuery::Overlap(aabb) = query
-            && self.index.prefers_grid()
-            && self.core.overlapping_in_grid(aabb, &mut |id| of_grid.push(id))
-        {
-            of_grid.sort_unstable();
-            return of_grid.into_iter().for_each(|id| _ = visit(id));
+    /// Visits the boxes that overlap one, in the grid if there is one of just these boxes, as in the middle of a step, when
+    /// continuous collision detection asks.
+    fn overlapping(&self, aabb: &Aabb, mut visit: impl FnMut(u32)) {
+        if !(self.index.prefers_grid() && self.core.overlapping_in_grid(aabb, &mut visit)) {
+            self.index.ask(&self.core, |index| index.overlapping(aabb, visit));
         }
-        self.index.visit(&self.core, query, visit);
     }
 
     /// Returns a tree of the same boxes, for queries that need one.

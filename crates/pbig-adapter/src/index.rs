@@ -4,8 +4,8 @@
 use crate::policy;
 use crate::{Colliders, Tree};
 use pbig_core::{Aabb, BoxIndex, BroadPhase};
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Mutex, PoisonError, RwLock, TryLockError};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// A scene query, by the boxes that it looks for.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,7 @@ impl<T: Tree<Aabb = Aabb>> Colliders<T> {
     /// Returns the indices of colliders whose boxes a query meets, sorted, and perhaps some that it barely misses.
     pub fn met(&self, query: &SceneQuery) -> Vec<u32> {
         let mut met = Vec::new();
-        self.visit(query, &mut |index| {
+        self.visit(query, |index| {
             met.push(index);
             query.bound()
         });
@@ -42,13 +42,14 @@ impl<T: Tree<Aabb = Aabb>> Colliders<T> {
 
     /// Returns the collider with the least cost below the query's bound, the one with the lowest index of several. `cost` also
     /// gets the cost up to which it matters.
+    #[inline(always)]
     pub fn best<R>(
         &self,
         query: &SceneQuery,
         cost: impl Fn(u32, f32) -> Option<(f32, R)>,
     ) -> Option<(u32, R)> {
         let (mut bound, mut best) = (query.bound(), None::<(u32, R)>);
-        self.visit(query, &mut |index| {
+        self.visit(query, |index| {
             // A little more than the best so far, so that the order of visits decides no ties.
             let reach = (bound * (1.0 + f32::EPSILON)).min(query.bound());
             if let Some((found, result)) = cost(index, reach) {
@@ -63,21 +64,28 @@ impl<T: Tree<Aabb = Aabb>> Colliders<T> {
     }
 }
 
-/// The index, and the changes that it does not know.
+/// The index of boxes. It is fresh or stale; a query makes it fresh.
 #[derive(Debug, Default)]
 pub(crate) struct SceneIndex {
-    state: RwLock<State>,
-    is_fresh: AtomicBool,
+    fresh: OnceLock<Fresh>,
+    stale: Mutex<Stale>,
     /// Questions that a grid has answered since the index was fresh.
     asked_of_grid: AtomicU32,
-    /// Held while the index is brought up to date. A writer never waits for readers of `state`: a sort gives up while there is
-    /// one, and a refresh runs while there is none. Otherwise a query inside a query could wait for a writer that waits for the
-    /// outer query.
-    refreshing: Mutex<()>,
 }
 
+/// An index of the boxes as they are, which queries read at once.
+#[derive(Debug)]
+struct Fresh {
+    index: BoxIndex,
+    /// The same boxes in a better order, once queries have paid for it.
+    sorted: OnceLock<BoxIndex>,
+    /// Held by the query that sorts. The others go on with the index as it is.
+    sorting: Mutex<()>,
+}
+
+/// An index of boxes as they were, and what has changed since.
 #[derive(Debug, Default)]
-struct State {
+struct Stale {
     index: BoxIndex,
     /// Ids whose boxes have changed since the index was fresh, repeated or not.
     changed: Vec<u32>,
@@ -95,13 +103,20 @@ impl Clone for SceneIndex {
 impl SceneIndex {
     /// Marks the index as stale. The changed boxes are those noted, and the core's pending changes.
     pub(crate) fn expire(&mut self) {
-        *self.is_fresh.get_mut() = false;
+        if let Some(Fresh { index, sorted, .. }) = self.fresh.take() {
+            let index = sorted.into_inner().unwrap_or(index);
+            *self.stale_mut() = Stale { index, changed: Vec::new(), knows_changes: true };
+        }
         *self.asked_of_grid.get_mut() = 0;
+    }
+
+    fn stale_mut(&mut self) -> &mut Stale {
+        self.stale.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns true if a grid should answer a question about a box: the index is stale, and few have asked since.
     pub(crate) fn prefers_grid(&self) -> bool {
-        let is_fresh = self.is_fresh.load(Ordering::Acquire);
+        let is_fresh = self.fresh.get().is_some();
         !is_fresh && self.asked_of_grid.fetch_add(1, Ordering::Relaxed) < policy::QUESTIONS_TO_GRID
     }
 
@@ -111,61 +126,49 @@ impl SceneIndex {
             return;
         }
         self.expire();
-        let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let stale = self.stale_mut();
         // A longer list saves nothing, because a refresh with many changes reads all boxes.
-        state.knows_changes &= state.changed.len() + changed.len() <= ids as usize / 8;
-        if state.knows_changes {
-            state.changed.extend_from_slice(changed);
+        stale.knows_changes &= stale.changed.len() + changed.len() <= ids as usize / 8;
+        if stale.knows_changes {
+            stale.changed.extend_from_slice(changed);
         } else {
-            state.changed.clear();
+            stale.changed.clear();
         }
     }
 
-    /// Visits the ids of the boxes that a query meets: first those at the start of the motion or around the point, sorted.
-    /// `visit` returns the bound up to which more are wanted.
-    pub(crate) fn visit(&self, core: &BroadPhase, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> f32) {
-        if !self.is_fresh.load(Ordering::Acquire) {
-            self.refresh(core);
-        }
-        let wants_sort = {
-            let index = &self.state.read().unwrap_or_else(PoisonError::into_inner).index;
-            match *query {
-                SceneQuery::Sweep(start, velocity, time) => index.sweep(&start, velocity, time, visit),
-                SceneQuery::Near(point, distance) => index.near(point, distance, visit),
-                SceneQuery::Overlap(aabb) => index.sweep(&aabb, [0.0; 3], 0.0, visit),
-            };
-            index.wants_sort()
-        };
-        if wants_sort {
-            self.sort(core);
+    /// Asks the index of the boxes as they are. The first query after a change brings it up to date.
+    #[inline(always)]
+    pub(crate) fn ask(&self, core: &BroadPhase, ask: impl FnOnce(&BoxIndex) -> u64) {
+        let fresh = self.fresh.get_or_init(|| self.refreshed(core));
+        let index = fresh.sorted.get().unwrap_or(&fresh.index);
+        ask(index);
+        if index.wants_sort() {
+            fresh.sort(core);
         }
     }
 
-    /// Sorts the index, unless another thread reads it; a later query tries again.
-    fn sort(&self, core: &BroadPhase) {
-        let mut state = match self.state.try_write() {
-            Ok(state) => state,
-            Err(TryLockError::Poisoned(state)) => state.into_inner(),
-            Err(TryLockError::WouldBlock) => return,
-        };
-        // Another thread may have sorted it meanwhile.
-        if state.index.wants_sort() {
-            state.index.sort(core.fat_aabbs());
-        }
-    }
-
-    fn refresh(&self, core: &BroadPhase) {
-        let _guard = self.refreshing.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.is_fresh.load(Ordering::Acquire) {
-            return;
-        }
-        // Readers have seen a fresh index, so there are none.
-        let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
-        let State { index, changed, knows_changes } = &mut *state;
+    /// Takes the stale index, and brings it up to date.
+    #[cold]
+    fn refreshed(&self, core: &BroadPhase) -> Fresh {
+        let stale = std::mem::take(&mut *self.stale.lock().unwrap_or_else(PoisonError::into_inner));
+        let Stale { mut index, mut changed, knows_changes } = stale;
         changed.extend_from_slice(core.changes());
         index.refresh(core.fat_aabbs(), knows_changes.then_some(&changed[..]));
-        changed.clear();
-        *knows_changes = true;
-        self.is_fresh.store(true, Ordering::Release);
+        Fresh { index, sorted: OnceLock::new(), sorting: Mutex::new(()) }
+    }
+}
+
+impl Fresh {
+    /// Sorts the boxes for later queries, unless another query does it just now.
+    #[cold]
+    fn sort(&self, core: &BroadPhase) {
+        let sort = || {
+            let mut index = BoxIndex::default();
+            index.sort(core.fat_aabbs());
+            index
+        };
+        if let Ok(_guard) = self.sorting.try_lock() {
+            self.sorted.get_or_init(sort);
+        }
     }
 }

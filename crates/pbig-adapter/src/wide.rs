@@ -5,7 +5,7 @@
 //! an update tests all candidates of changed boxes.
 
 use crate::bounds::{Bounds, BoxStore, Scalar};
-use crate::{SceneQuery, policy};
+use crate::policy;
 use pbig_core::{Aabb, BroadPhase, Error, Events, Pair, ProxyFilter};
 use std::collections::BTreeSet;
 use std::iter::Peekable;
@@ -298,26 +298,25 @@ impl BoxStore<WideAabb> for WideBoxes {
         WideAabb { min: absolute(aabb.min), max: absolute(aabb.max) }
     }
 
-    /// A direction that f32 cannot hold meets everything.
-    fn narrow(&self, query: &SceneQuery<WideAabb, f64>) -> SceneQuery {
-        match *query {
-            SceneQuery::Sweep(start, velocity, time) => {
-                let velocity = velocity.map(|x| x as f32);
-                if !velocity.iter().all(|x| x.is_finite()) {
-                    return SceneQuery::Overlap(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
-                }
-                SceneQuery::Sweep(self.to_core(&start), velocity, self.narrow_bound(time))
-            }
-            SceneQuery::Near(point, distance) => {
-                let at = std::array::from_fn(|k| (point[k] - self.centre[k]) as f32);
-                SceneQuery::Near(at, self.narrow_bound(distance))
-            }
-            SceneQuery::Overlap(aabb) => SceneQuery::Overlap(self.to_core(&aabb)),
+    /// If the direction overflows f32, all boxes are met at once.
+    fn narrow_motion(&self, start: &WideAabb, velocity: &[f64; 3]) -> (Aabb, [f32; 3]) {
+        let narrow = velocity.map(|x| x as f32);
+        if velocity.iter().any(|x| x.is_nan()) || narrow.iter().all(|x| x.is_finite()) {
+            return (self.to_core(start), narrow);
         }
+        (Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]), [0.0; 3])
     }
 
-    fn is_met(&self, query: &SceneQuery<WideAabb, f64>, id: u32) -> bool {
-        !matches!(query, SceneQuery::Overlap(aabb) if !self.get(id).overlaps(aabb))
+    fn narrow_point(&self, point: &[f64; 3]) -> [f32; 3] {
+        std::array::from_fn(|k| (point[k] - self.centre[k]) as f32)
+    }
+
+    fn narrow_box(&self, aabb: &WideAabb) -> Aabb {
+        self.to_core(aabb)
+    }
+
+    fn overlaps(&self, id: u32, aabb: &WideAabb) -> bool {
+        self.get(id).overlaps(aabb)
     }
 
     /// A millionth more than the bound covers the rounding of the query to f32.

@@ -33,19 +33,6 @@ impl PbigFinder {
 
 pbig_adapter::define_methods!(PbigFinder);
 
-fn to_query(query: &SceneQuery) -> pbig_adapter::SceneQuery<Bounds, Real> {
-    use pbig_adapter::SceneQuery as Query;
-    match *query {
-        SceneQuery::Ray(ray, time) => {
-            let origin = spatial(ray.origin);
-            Query::Sweep(Bounds::from_corners(origin, origin), spatial(ray.dir), time)
-        }
-        SceneQuery::Sweep(aabb, velocity, time) => Query::Sweep(from_tree(&aabb), spatial(velocity), time),
-        SceneQuery::Near(point, distance) => Query::Near(spatial(point), distance),
-        SceneQuery::Overlap(aabb) => Query::Overlap(from_tree(&aabb)),
-    }
-}
-
 impl PairFinder for PbigFinder {
     fn update(
         &mut self,
@@ -80,7 +67,22 @@ impl PairFinder for PbigFinder {
     }
 
     fn visit(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> Real) {
-        self.colliders.visit(&to_query(query), visit);
+        use pbig_adapter::SceneQuery as Query;
+        // A call for each kind: a query that was copied into one place would be read before it is written.
+        match *query {
+            SceneQuery::Ray(ray, time) => {
+                let origin = spatial(ray.origin);
+                let start = Bounds::from_corners(origin, origin);
+                self.colliders.visit(&Query::Sweep(start, spatial(ray.dir), time), visit);
+            }
+            SceneQuery::Sweep(aabb, velocity, time) => {
+                self.colliders.visit(&Query::Sweep(from_tree(aabb), spatial(*velocity), time), visit);
+            }
+            SceneQuery::Near(point, distance) => {
+                self.colliders.visit(&Query::Near(spatial(*point), distance), visit);
+            }
+            SceneQuery::Overlap(aabb) => self.colliders.visit(&Query::Overlap(from_tree(aabb)), visit),
+        }
     }
 
     fn state(&self) -> (Vec<(ColliderHandle, TreeAabb)>, Vec<(ColliderHandle, ColliderHandle)>) {

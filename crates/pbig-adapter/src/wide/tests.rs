@@ -167,8 +167,8 @@ fn narrow_queries_meet_what_the_wide_ones_meet() {
         let [at, along] = [[0.0; 3], [0.0; 3]].map(|zero| zero.map(|_: f64| world.random()));
         let (at, along) = (at.map(|x| 1e7 + 30.0 * x), along.map(|x| x - 0.5));
         // A point on the way touches a box's corner exactly, or nearly.
-        let query = SceneQuery::Sweep(WideAabb { min: at, max: at }, along, 1e3);
-        let SceneQuery::Sweep(start, velocity, time) = world.boxes.narrow(&query) else { unreachable!() };
+        let (start, velocity) = world.boxes.narrow_motion(&WideAabb { min: at, max: at }, &along);
+        let time = world.boxes.narrow_bound(1e3);
         for id in 0..500 {
             let fat = world.boxes.get(id);
             let [enter, leave] = (0..3).fold([0.0, 1e3], |[enter, leave], k| {

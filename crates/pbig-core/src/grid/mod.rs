@@ -38,7 +38,7 @@ pub use occupied::OccupiedCell;
 pub(crate) use record::Record;
 pub(crate) use search::Sorted;
 pub use simd::simd;
-pub(crate) use simd::{BLOCK, EightBoxes, Portable, Simd, dispatch, prefetch};
+pub(crate) use simd::{BLOCK, Eight, EightBoxes, Portable, Simd, dispatch, prefetch};
 pub(crate) use spacing::GridPlan;
 pub use spacing::NeighbourScan;
 

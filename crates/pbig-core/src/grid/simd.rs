@@ -43,6 +43,28 @@ pub(crate) trait Simd: Copy {
     /// Returns a bit for each number that is not among the first `len` (at most 8) others.
     fn absent(self, numbers: &Eight, others: &Eight, len: usize) -> u32;
 
+    /// Returns eight boxes of a list. An invalid one, and one that is not in the list, becomes an empty box: from infinity to minus infinity.
+    fn gather(self, list: &[Aabb], at: &Eight) -> EightBoxes;
+
+    /// Returns the box around eight boxes; an empty one around empty ones.
+    fn around(self, boxes: &EightBoxes) -> Aabb;
+
+    /// Returns the lane of the least of those keys that are at most their limit. Keys are not negative. Of keys that differ in their last
+    /// three bits alone the first one counts as the least.
+    fn nearest(self, keys: &[f32; BLOCK], limits: &[f32; BLOCK]) -> Option<usize>;
+
+    /// Returns those keys that are at most their limit, and their values, the largest key first and that of [`Simd::nearest`] last, any
+    /// others behind them, and their number.
+    fn farthest_first(
+        self,
+        keys: &[f32; BLOCK],
+        limits: &[f32; BLOCK],
+        values: &Eight,
+    ) -> ([f32; BLOCK], Eight, usize);
+
+    /// Returns a bit for each of eight numbers that is at most the other one.
+    fn at_most(self, numbers: &[f32; BLOCK], others: &[f32; BLOCK]) -> u32;
+
     /// Returns a bit for each of eight boxes that overlaps a box.
     fn overlaps_eight(self, boxes: &EightBoxes, aabb: &Aabb) -> u32;
 }
@@ -56,6 +78,14 @@ pub(super) fn eight_from(list: &mut [u32], from: usize) -> &mut Eight {
 /// Any processor.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable;
+
+impl Portable {
+    /// Calls a function that is inlined here, and not beside the code for other instructions.
+    #[inline(never)]
+    pub(crate) fn run<T>(self, work: impl FnOnce() -> T) -> T {
+        work()
+    }
+}
 
 impl Simd for Portable {
     #[inline(always)]
@@ -114,6 +144,60 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    fn gather(self, list: &[Aabb], at: &Eight) -> EightBoxes {
+        let mut boxes = [[0.0; BLOCK]; 6];
+        for lane in 0..BLOCK {
+            let aabb = list.get(at[lane] as usize).unwrap_or(&Aabb::NOWHERE);
+            let is_valid = aabb.is_valid();
+            for k in 0..3 {
+                boxes[k][lane] = if is_valid { aabb.min[k] } else { f32::INFINITY };
+                boxes[k + 3][lane] = if is_valid { aabb.max[k] } else { f32::NEG_INFINITY };
+            }
+        }
+        boxes
+    }
+
+    #[inline(always)]
+    fn around(self, boxes: &EightBoxes) -> Aabb {
+        let mut around = Aabb::NOWHERE;
+        for k in 0..3 {
+            around.min[k] = fold(&boxes[k], |a, b| if a < b { a } else { b });
+            around.max[k] = fold(&boxes[k + 3], |a, b| if a > b { a } else { b });
+        }
+        around
+    }
+
+    #[inline(always)]
+    fn nearest(self, keys: &[f32; BLOCK], limits: &[f32; BLOCK]) -> Option<usize> {
+        let lanes = (0..BLOCK).filter(|lane| keys[*lane] <= limits[*lane]);
+        lanes.min_by_key(|lane| word(keys, *lane))
+    }
+
+    #[inline(always)]
+    fn farthest_first(
+        self,
+        keys: &[f32; BLOCK],
+        limits: &[f32; BLOCK],
+        values: &Eight,
+    ) -> ([f32; BLOCK], Eight, usize) {
+        let (mut order, mut count) = ([0; BLOCK], 0);
+        for lane in (0..BLOCK).filter(|lane| keys[*lane] <= limits[*lane]) {
+            let mut at = count;
+            while at > 0 && word(keys, order[at - 1]) < word(keys, lane) {
+                order[at] = order[at - 1];
+                at -= 1;
+            }
+            (order[at], count) = (lane, count + 1);
+        }
+        (order.map(|lane| keys[lane]), order.map(|lane| values[lane]), count)
+    }
+
+    #[inline(always)]
+    fn at_most(self, numbers: &[f32; BLOCK], others: &[f32; BLOCK]) -> u32 {
+        (0..BLOCK).fold(0, |mask, lane| mask | u32::from(numbers[lane] <= others[lane]) << lane)
+    }
+
+    #[inline(always)]
     fn overlaps_eight(self, boxes: &EightBoxes, aabb: &Aabb) -> u32 {
         let mut overlaps = [1; BLOCK];
         for k in 0..3 {
@@ -124,6 +208,20 @@ impl Simd for Portable {
         }
         (0..BLOCK).fold(0, |mask, lane| mask | overlaps[lane] << lane)
     }
+}
+
+/// Returns an integer in the order of keys that are not negative. Its last bits are the lane, so that no two are equal.
+#[inline(always)]
+fn word(keys: &[f32; BLOCK], lane: usize) -> u32 {
+    keys[lane].to_bits() & !(BLOCK as u32 - 1) | lane as u32
+}
+
+/// Folds eight numbers in halves: one after the other takes twice as long.
+#[inline(always)]
+fn fold(numbers: &[f32; BLOCK], of: impl Fn(f32, f32) -> f32) -> f32 {
+    let mut four = [0.0; 4];
+    (0..4).for_each(|i| four[i] = of(numbers[i], numbers[i + 4]));
+    of(of(four[0], four[2]), of(four[1], four[3]))
 }
 
 /// Returns the instructions that the CPU backend uses on this machine: "AVX2" or "portable".
@@ -147,7 +245,7 @@ macro_rules! dispatch {
     ($work:path, $($argument:expr),*) => {
         match $crate::grid::Avx2::detect() {
             Some(avx2) => avx2.run(#[inline(always)] || $work(avx2, $($argument),*)),
-            None => $work($crate::grid::Portable, $($argument),*),
+            None => $crate::grid::Portable.run(#[inline(always)] || $work($crate::grid::Portable, $($argument),*)),
         }
     };
 }
@@ -156,7 +254,7 @@ macro_rules! dispatch {
 #[cfg(not(target_arch = "x86_64"))]
 macro_rules! dispatch {
     ($work:path, $($argument:expr),*) => {
-        $work($crate::grid::Portable, $($argument),*)
+        $crate::grid::Portable.run(#[inline(always)] || $work($crate::grid::Portable, $($argument),*))
     };
 }
 pub(crate) use dispatch;

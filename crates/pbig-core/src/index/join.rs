@@ -98,7 +98,7 @@ impl Join<'_, '_> {
     #[inline(always)]
     fn meet(&mut self, simd: impl Simd, leaf: u32, waiting: &mut Vec<u32>) {
         let index = self.index;
-        let bounds = index.nodes[leaf as usize].bounds();
+        let bounds = index.bounds[leaf as usize];
         let earliest = leaf.max(self.earliest);
         let mut from = self.hits.pairs.len();
         waiting.extend(index.root());
@@ -129,7 +129,7 @@ impl Join<'_, '_> {
     #[inline(always)]
     fn test(&mut self, simd: impl Simd, leaf: u32, at: u32, bounds: &Aabb) {
         let (one, other) = (&self.index.nodes[leaf as usize], &self.index.nodes[at as usize]);
-        let mut lanes = simd.overlaps_eight(&one.boxes, &other.bounds());
+        let mut lanes = simd.overlaps_eight(&one.boxes, &self.index.bounds[at as usize]);
         // At the edge of a crowd all boxes of one leaf can overlap the bounds of the other leaf, although no two boxes overlap.
         // The second test, of the other leaf's boxes against the first one's bounds, finds this at once.
         if lanes.count_ones() > FEW_LANES && leaf != at {

@@ -11,7 +11,7 @@
 
 mod join;
 mod node;
-mod question;
+mod query;
 mod refit;
 mod sort;
 #[cfg(test)]
@@ -21,9 +21,8 @@ mod walk;
 use crate::grid::dispatch;
 use crate::{Aabb, OccupiedCell};
 use node::{LANES, Node};
-use question::{Near, Question, Sweep};
+use query::Cast;
 use std::sync::atomic::{AtomicU64, Ordering};
-use walk::Walk;
 
 /// Boxes by id, for questions about places: which boxes does a ray, a moving box, a box or a point meet?
 ///
@@ -37,7 +36,7 @@ use walk::Walk;
 /// // The first box on a ray: each visit shortens the ray.
 /// let (point, along) = (Aabb::new([2.0, 0.0, 0.0], [2.0, 0.0, 0.0]), [1.0, 0.0, 0.0]);
 /// let mut first = (f32::INFINITY, None);
-/// index.sweep(&point, along, 100.0, &mut |id| {
+/// index.cast_aabb(&point, along, 100.0, |id| {
 ///     let distance = boxes[id as usize].min[0] - 2.0;
 ///     if distance < first.0 {
 ///         first = (distance, Some(id));
@@ -55,18 +54,23 @@ pub struct BoxIndex {
     end: u32,
     /// By node: the lane in which its parent has it (node times eight plus lane), or `NONE`.
     parents: Vec<u32>,
+    /// By node: the box around its boxes.
+    bounds: Vec<Aabb>,
     /// By node: the sum of its extents at the last sort; infinite once it has grown past twice that.
     extents: Vec<f32>,
     grown: usize,
     /// By id: the lane of its box, or `NONE`.
     places: Vec<u32>,
-    /// Length of the list of boxes at the last layout.
+    /// Lengths of the list of boxes at the last layout, and now.
     listed: usize,
+    known: usize,
     is_sorted: bool,
     /// Boxes may have moved since the last sort.
     has_moved: bool,
-    /// Nodes that questions have looked at since the last sort.
+    /// Nodes that queries have looked at since the last sort; not counted while no sort is wanted.
     looked_at: AtomicU64,
+    /// Nodes for queries to look at before a sort pays; none if no number of them is enough.
+    sort_after: Option<u64>,
 }
 
 impl Clone for BoxIndex {
@@ -77,71 +81,77 @@ impl Clone for BoxIndex {
 }
 
 impl BoxIndex {
-    /// Visits the ids of boxes that a moving box meets between time 0 and `max_time`: those at time 0 first, by id, then the
-    /// others, about the earliest first. `start` is the moving box at time 0 (a point for a ray), `velocity` its motion in a
-    /// unit of time.
+    /// Visits the ids of boxes that a moving box meets between time 0 and `max_time`, about the earliest first. `start` is the
+    /// moving box at time 0 (a point for a ray), `velocity` its motion in a unit of time.
     ///
-    /// `visit` returns the time until which further boxes are wanted; boxes that are met just after it may be visited as well.
-    /// After a time of 0 no box is wanted. No box is visited twice. With a NaN in the question, or a
-    /// negative time, no box is visited. Returns the number of nodes, of eight boxes each, that were tested.
-    pub fn sweep(
+    /// `visit` returns the time until which further boxes are wanted; boxes that are met just after it may be visited as well. After
+    /// a time of 0 only boxes that are met at time 0 are visited, and of these only those with lower ids: so a caller that takes
+    /// the lowest id of several at one time needs no others. After a negative time none is visited. No box is visited twice. With a
+    /// NaN in the query, or a negative `max_time`, no box is visited. Returns the number of nodes, of eight boxes each, that were
+    /// tested.
+    #[inline(always)]
+    pub fn cast_aabb(
         &self,
         start: &Aabb,
         velocity: [f32; 3],
         max_time: f32,
-        visit: &mut dyn FnMut(u32) -> f32,
+        visit: impl FnMut(u32) -> f32,
     ) -> u64 {
-        Sweep::new(start, velocity, max_time).map_or(0, |question| self.ask(question, max_time, visit))
-    }
-
-    /// Visits the ids of boxes within a distance of a point: those around it first, by id, then the others, about the nearest
-    /// first. `visit` returns the distance up to which
-    /// further boxes are wanted; boxes just beyond may be visited as well. Returns the number of nodes that were tested.
-    pub fn near(&self, point: [f32; 3], max_distance: f32, visit: &mut dyn FnMut(u32) -> f32) -> u64 {
-        let is_place = point.iter().all(|x| x.is_finite());
-        if is_place { self.ask(Near { point }, max_distance, visit) } else { 0 }
-    }
-
-    /// Visits the ids of boxes that overlap a box, in ascending order. Returns the number of nodes that were tested.
-    pub fn overlapping(&self, aabb: &Aabb, visit: &mut dyn FnMut(u32)) -> u64 {
-        self.sweep(aabb, [0.0; 3], 0.0, &mut |id| {
-            visit(id);
-            0.0
-        })
-    }
-
-    fn ask<Q: Question>(&self, question: Q, bound: f32, visit: &mut dyn FnMut(u32) -> f32) -> u64 {
-        if bound.is_nan() || bound < 0.0 {
+        let Some(cast) = Cast::new(start, velocity, max_time) else { return 0 };
+        // Rays that miss everything are many, and the instructions for eight boxes take longer to begin with.
+        if self.loose().is_empty() && !self.bounds.last().is_some_and(|all| cast.meets(all, max_time)) {
             return 0;
         }
-        // An empty lane is met at infinity.
-        let bound = bound.min(f32::MAX);
-        let walk = Walk { index: self, question, bound, visit, at_start: Vec::new(), looked_at: 0 };
-        let looked_at = dispatch!(Walk::answer, walk);
-        self.looked_at.fetch_add(looked_at, Ordering::Relaxed);
+        self.note(dispatch!(walk::cast, self, (cast, max_time), visit))
+    }
+
+    /// Visits the ids of boxes within a distance of a point, about the nearest first. `visit` returns the distance up to which
+    /// further boxes are wanted, by the rules of [`BoxIndex::cast_aabb`]. Returns the number of nodes that were tested.
+    #[inline(always)]
+    pub fn near(&self, point: [f32; 3], max_distance: f32, visit: impl FnMut(u32) -> f32) -> u64 {
+        self.note(dispatch!(walk::near, self, (point, max_distance), visit))
+    }
+
+    /// Visits the ids of boxes that overlap a box, in no particular order. Returns the number of nodes that were tested.
+    #[inline(always)]
+    pub fn overlapping(&self, aabb: &Aabb, visit: impl FnMut(u32)) -> u64 {
+        self.note(dispatch!(walk::overlapping, self, aabb, visit))
+    }
+
+    /// Counts nodes that a query has looked at, where they can lead to a sort. Queries of several threads may miss each other's: an
+    /// addition at once takes as long as a node.
+    #[inline(always)]
+    fn note(&self, looked_at: u64) -> u64 {
+        if self.sort_after.is_some() {
+            let before = self.looked_at.load(Ordering::Relaxed);
+            self.looked_at.store(before + looked_at, Ordering::Relaxed);
+        }
         looked_at
     }
 
     /// Returns the leaves and the ids of their boxes, for pictures.
     pub(crate) fn occupied_leaves(&self) -> Vec<OccupiedCell> {
-        let leaves = (0..self.leaves).chain(self.loose()).map(|leaf| &self.nodes[leaf as usize]);
-        let cells = leaves.map(|node| OccupiedCell {
-            aabb: node.bounds(),
-            ids: (0..LANES).filter(|lane| node.has(*lane)).map(|lane| node.children[lane]).collect(),
-        });
+        let cell = |leaf: u32| {
+            let node = &self.nodes[leaf as usize];
+            let ids = (0..LANES).filter(|lane| node.has(*lane)).map(|lane| node.children[lane]).collect();
+            OccupiedCell { aabb: self.bounds[leaf as usize], ids }
+        };
+        let cells = (0..self.leaves).chain(self.loose()).map(cell);
         cells.filter(|cell| !cell.ids.is_empty()).collect()
     }
 
+    #[inline(always)]
     fn root(&self) -> Option<u32> {
         self.end.checked_sub(1)
     }
 
     #[inline(always)]
     fn is_leaf(&self, node: u32) -> bool {
-        node < self.leaves
+        node < self.leaves || node >= self.end
     }
 
     /// Returns the leaves that no other node holds.
+    #[inline(always)]
     fn loose(&self) -> std::ops::Range<u32> {
         self.end..self.nodes.len() as u32
     }

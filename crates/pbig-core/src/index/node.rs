@@ -1,7 +1,7 @@
 //! A node: eight boxes, axis by axis, and what each stands for.
 
 use crate::Aabb;
-use crate::grid::{BLOCK, EightBoxes};
+use crate::grid::{BLOCK, EightBoxes, Simd};
 
 /// Boxes in a node.
 pub(super) const LANES: usize = BLOCK;
@@ -61,30 +61,10 @@ impl Node {
         self.boxes[0][lane] <= self.boxes[3][lane]
     }
 
-    /// Returns the box around all lanes; an invalid one if all are empty.
+    /// Returns a bit for each lane that has a box.
     #[inline(always)]
-    pub(super) fn bounds(&self) -> Aabb {
-        // Loops: `map` on arrays is not inlined into a kernel.
-        let mut bounds = Aabb::NOWHERE;
-        for k in 0..3 {
-            bounds.min[k] = fold(&self.boxes[k], |a, b| if a < b { a } else { b });
-            bounds.max[k] = fold(&self.boxes[k + 3], |a, b| if a > b { a } else { b });
-        }
-        bounds
-    }
-
-    /// Reads the boxes that a leaf stands for.
-    #[inline(always)]
-    pub(super) fn read(&mut self, boxes: &[Aabb]) {
-        for lane in 0..LANES {
-            self.set(lane, boxes.get(self.children[lane] as usize).unwrap_or(&Aabb::NOWHERE));
-        }
-    }
-
-    /// Returns true if a lane has this box.
-    #[inline(always)]
-    pub(super) fn holds(&self, lane: usize, aabb: &Aabb) -> bool {
-        (0..3).all(|k| (self.boxes[k][lane] == aabb.min[k]) & (self.boxes[k + 3][lane] == aabb.max[k]))
+    pub(super) fn used(&self, simd: impl Simd) -> u32 {
+        simd.at_most(&self.boxes[0], &self.boxes[3])
     }
 }
 
@@ -94,14 +74,6 @@ pub(super) fn extent_sum(aabb: &Aabb) -> f32 {
         return 0.0;
     }
     (0..3).map(|k| aabb.max[k] - aabb.min[k]).sum()
-}
-
-/// Folds eight numbers in halves: one after the other takes twice as long.
-#[inline(always)]
-fn fold(lanes: &Lanes, of: impl Fn(f32, f32) -> f32) -> f32 {
-    let mut four = [0.0; 4];
-    (0..4).for_each(|i| four[i] = of(lanes[i], lanes[i + 4]));
-    of(of(four[0], four[2]), of(four[1], four[3]))
 }
 
 /// Takes the lowest bit out of a mask, and returns its number.

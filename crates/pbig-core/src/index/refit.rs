@@ -5,24 +5,34 @@ use super::node::{LANES, NONE, Node, extent_sum};
 use super::sort::{Entry, sort};
 use crate::Aabb;
 use crate::grid::{Simd, dispatch, prefetch};
-use crate::policy::index as policy;
+use crate::parallel::{SharedSlice, available_threads, run};
+use crate::policy::{PARALLEL_FROM_BOXES, index as policy};
 use std::sync::atomic::Ordering;
+
+/// Leaves that a thread reads at a time.
+const PIECE: usize = 256;
 
 /// Leaves between the one that is read and the one whose boxes are asked for.
 const READ_AHEAD: usize = 3;
 
 impl BoxIndex {
     /// Takes the boxes as they are now: `boxes` by id, [`Aabb::NOWHERE`] for an absent one. `changed` are the ids whose boxes
-    /// may differ from those at the last call, in any order, repeated or not; without it any box may differ.
+    /// may differ from those at the last call, in any order, repeated or not; without it any box may differ. Ids beyond the list have
+    /// no box.
     pub fn refresh(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
         self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
         let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < self.listed;
         match changed.filter(is_few) {
-            Some(changed) => changed.iter().for_each(|&id| self.take(id, boxes)),
+            Some(changed) => {
+                let gone = boxes.len() as u32..self.known as u32;
+                changed.iter().copied().chain(gone).for_each(|id| self.take(id, boxes));
+            }
             None => self.refit(boxes),
         }
+        self.known = boxes.len();
+        self.plan_sort();
         if self.wants_sort() || self.loose().len() > policy::loose_leaves(self.leaves) {
-            self.lay_out(boxes, self.has_earned_sort(1).then_some(u32::MAX));
+            self.lay_out(boxes, self.has_earned_sort().then_some(u32::MAX));
         }
     }
 
@@ -34,6 +44,7 @@ impl BoxIndex {
         }
         self.has_moved = true;
         changed.iter().for_each(|&id| self.take(id, boxes));
+        self.plan_sort();
         let is_loose = self.loose().len() > policy::loose_leaves(self.leaves);
         !is_loose && !self.wants_sort()
     }
@@ -60,18 +71,30 @@ impl BoxIndex {
         }
     }
 
-    /// Returns true if sorting the boxes anew would pay: questions have looked at as many nodes as a sort costs, and the order
-    /// is bad. [`BoxIndex::refresh`] sorts then, too.
+    /// Returns true if sorting the boxes anew would pay: queries have looked at as many nodes as a sort costs, and the order is bad.
+    /// [`BoxIndex::refresh`] sorts then, too.
+    #[inline]
     pub fn wants_sort(&self) -> bool {
+        self.sort_after.is_some_and(|nodes| self.looked_at.load(Ordering::Relaxed) >= nodes)
+    }
+
+    /// Chooses the number of nodes that queries look at before the next sort: as many as one sort costs if the order is bad, some
+    /// more if boxes have moved, and no number if the order is as after a sort.
+    fn plan_sort(&mut self) {
         let has_many_loose = policy::FEW_LOOSE_SHARE * self.loose().len() > policy::loose_leaves(self.leaves);
         let has_grown = self.grown * policy::GROWN_SHARE > self.end as usize;
         let is_bad = !self.is_sorted || has_many_loose || has_grown;
-        is_bad && self.has_earned_sort(1) || self.has_moved && self.has_earned_sort(policy::SORTS_FOR_ORDER)
+        let one = policy::nodes_for_sort(self.leaves, self.listed);
+        self.sort_after = match (is_bad, self.has_moved) {
+            (true, _) => Some(one),
+            (false, true) => Some(policy::SORTS_FOR_ORDER * one),
+            (false, false) => None,
+        };
     }
 
-    /// Returns true if questions have looked at as many nodes as this number of sorts costs.
-    fn has_earned_sort(&self, sorts: u64) -> bool {
-        self.looked_at.load(Ordering::Relaxed) >= sorts * policy::nodes_for_sort(self.leaves, self.listed)
+    /// Returns true if queries have looked at as many nodes as a sort costs.
+    fn has_earned_sort(&self) -> bool {
+        self.looked_at.load(Ordering::Relaxed) >= policy::nodes_for_sort(self.leaves, self.listed)
     }
 
     /// Sorts the boxes as they are now.
@@ -89,7 +112,7 @@ impl BoxIndex {
         if self.end == 0 {
             return self.lay_out(boxes, None);
         }
-        dispatch!(Self::read_leaves, self, boxes);
+        self.read_all(boxes);
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         for (id, aabb) in boxes.iter().enumerate() {
             if self.places[id] == NONE && aabb.is_valid() {
@@ -98,19 +121,21 @@ impl BoxIndex {
         }
     }
 
-    /// Reads the boxes of all leaves, and passes their bounds on, children first.
-    #[inline(always)]
-    fn read_leaves(_: impl Simd, index: &mut Self, boxes: &[Aabb]) {
-        for leaf in (0..index.leaves).chain(index.loose()) {
-            if let Some(next) = index.nodes.get(leaf as usize + READ_AHEAD) {
-                next.children.iter().for_each(|id| prefetch(boxes.as_ptr().wrapping_add(*id as usize)));
-            }
-            index.nodes[leaf as usize].read(boxes);
-            index.tell_parent(leaf);
-        }
-        for node in index.leaves..index.end {
-            index.tell_parent(node);
-        }
+    /// Reads the boxes of all leaves, then those of the other nodes, children first.
+    fn read_all(&mut self, boxes: &[Aabb]) {
+        let (leaves, end) = (self.leaves as usize, self.end as usize);
+        let workers = if self.known < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
+        let (nodes, bounds) = (SharedSlice::new(&mut self.nodes), SharedSlice::new(&mut self.bounds));
+        run(workers, leaves.div_ceil(PIECE), |_, piece| {
+            let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
+            // SAFETY: pieces have different leaves.
+            let (nodes, bounds) = unsafe { (nodes.part(leaves.clone()), bounds.part(leaves)) };
+            dispatch!(read, nodes, bounds, boxes);
+        });
+        dispatch!(read, &mut self.nodes[end..], &mut self.bounds[end..], boxes);
+        dispatch!(read_inner, &mut self.nodes[leaves..end], &mut self.bounds, leaves);
+        let grown = self.bounds.iter().zip(&mut self.extents).map(|(bounds, extent)| outgrows(bounds, extent));
+        self.grown += grown.map(usize::from).sum::<usize>();
     }
 
     /// Reads one box.
@@ -118,10 +143,26 @@ impl BoxIndex {
         let place = self.places.get(id as usize).copied().unwrap_or(NONE);
         let aabb = boxes.get(id as usize).copied().unwrap_or(Aabb::NOWHERE);
         if place != NONE {
-            self.nodes[place as usize / LANES].set(place as usize % LANES, &aabb);
-            self.tell_ancestors(place / LANES as u32);
+            dispatch!(Self::put, self, place, &aabb);
         } else if aabb.is_valid() {
             self.add(id, boxes);
+        }
+    }
+
+    /// Stores a box in a lane, and tells the ancestors of the node its bounds, up to the first one that they do not change.
+    #[inline(always)]
+    fn put(simd: impl Simd, index: &mut Self, mut place: u32, aabb: &Aabb) {
+        let mut aabb = *aabb;
+        while place != NONE {
+            let at = place as usize / LANES;
+            index.nodes[at].set(place as usize % LANES, &aabb);
+            aabb = simd.around(&index.nodes[at].boxes);
+            if index.bounds[at] == aabb {
+                return;
+            }
+            index.bounds[at] = aabb;
+            index.grown += usize::from(outgrows(&aabb, &mut index.extents[at]));
+            place = index.parents[at];
         }
     }
 
@@ -139,38 +180,16 @@ impl BoxIndex {
         let node = &mut self.nodes[at];
         let lane = node.children.iter().position(|child| *child == NONE).unwrap_or(LANES - 1);
         node.children[lane] = id;
-        node.set(lane, &boxes[id as usize]);
-        self.places[id as usize] = (at * LANES + lane) as u32;
+        let place = (at * LANES + lane) as u32;
+        self.places[id as usize] = place;
+        dispatch!(Self::put, self, place, &boxes[id as usize]);
     }
 
     fn push(&mut self, node: Node) {
         self.nodes.push(node);
         self.parents.push(NONE);
+        self.bounds.push(Aabb::NOWHERE);
         self.extents.push(f32::INFINITY);
-    }
-
-    /// Copies the bounds of a node into its parent. Returns the parent; none if there is none, or if it has them already.
-    #[inline(always)]
-    fn tell_parent(&mut self, node: u32) -> Option<u32> {
-        let (bounds, place) = (self.nodes[node as usize].bounds(), self.parents[node as usize]);
-        let extent = &mut self.extents[node as usize];
-        if extent_sum(&bounds) > policy::GROWN_TO * *extent {
-            (*extent, self.grown) = (f32::INFINITY, self.grown + 1);
-        }
-        let (parent, lane) = (place / LANES as u32, place as usize % LANES);
-        if place == NONE || self.nodes[parent as usize].holds(lane, &bounds) {
-            return None;
-        }
-        self.nodes[parent as usize].set(lane, &bounds);
-        Some(parent)
-    }
-
-    /// Tells a node's ancestors its bounds, up to the first one that they do not change.
-    fn tell_ancestors(&mut self, node: u32) {
-        let mut next = Some(node);
-        while let Some(node) = next {
-            next = self.tell_parent(node);
-        }
     }
 
     /// Makes all nodes anew: in the order of ids, or with a `split` sorted as two sets, the first with the ids below it.
@@ -180,6 +199,7 @@ impl BoxIndex {
         self.forget_places();
         self.nodes.clear();
         self.parents.clear();
+        self.bounds.clear();
         self.extents.clear();
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         self.listed = boxes.len();
@@ -192,13 +212,15 @@ impl BoxIndex {
         roots = self.push_parents(roots);
         debug_assert!(roots.len() < 2);
         self.end = self.nodes.len() as u32;
-        dispatch!(Self::read_leaves, self, boxes);
-        self.extents = self.nodes.iter().map(|node| extent_sum(&node.bounds())).collect();
+        self.known = boxes.len();
+        self.read_all(boxes);
+        self.extents = self.bounds.iter().map(extent_sum).collect();
         (self.grown, self.is_sorted) = (0, split.is_some());
         if self.is_sorted {
             *self.looked_at.get_mut() = 0;
             self.has_moved = false;
         }
+        self.plan_sort();
     }
 
     /// Makes the leaves of a class; returns their numbers.
@@ -231,4 +253,35 @@ impl BoxIndex {
         }
         level
     }
+}
+
+/// Reads the boxes of leaves, and the boxes around them.
+#[inline(always)]
+fn read(simd: impl Simd, leaves: &mut [Node], bounds: &mut [Aabb], boxes: &[Aabb]) {
+    for at in 0..leaves.len() {
+        if let Some(ahead) = leaves.get(at + READ_AHEAD) {
+            ahead.children.iter().for_each(|id| prefetch(boxes.as_ptr().wrapping_add(*id as usize)));
+        }
+        leaves[at].boxes = simd.gather(boxes, &leaves[at].children);
+        bounds[at] = simd.around(&leaves[at].boxes);
+    }
+}
+
+/// Reads the bounds of the children of nodes, which lie before them; `first` is the number of the first node.
+#[inline(always)]
+fn read_inner(simd: impl Simd, nodes: &mut [Node], bounds: &mut [Aabb], first: usize) {
+    for (at, node) in nodes.iter_mut().enumerate() {
+        node.boxes = simd.gather(bounds, &node.children);
+        bounds[first + at] = simd.around(&node.boxes);
+    }
+}
+
+/// Returns true, once, if a node has grown to more than twice its extents at the last sort.
+#[inline(always)]
+fn outgrows(bounds: &Aabb, extent: &mut f32) -> bool {
+    let is_grown = extent_sum(bounds) > policy::GROWN_TO * *extent;
+    if is_grown {
+        *extent = f32::INFINITY;
+    }
+    is_grown
 }

@@ -1,7 +1,7 @@
 //! The index gives the answers of a scan of all boxes, after all kinds of changes, and looks at few boxes.
 
 use super::BoxIndex;
-use crate::grid::{Hits, Rule};
+use crate::grid::{Hits, Portable, Rule, Simd};
 use crate::{Aabb, Config, Engine, Finder, Pair, oracle};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -44,7 +44,7 @@ fn distance(point: [f32; 3], other: &Aabb) -> f64 {
 /// Returns the boxes that a sweep meets, in the order of the visits.
 fn met(index: &BoxIndex, start: &Aabb, velocity: [f32; 3], max_time: f32) -> Vec<u32> {
     let mut found = Vec::new();
-    index.sweep(start, velocity, max_time, &mut |id| {
+    index.cast_aabb(start, velocity, max_time, |id| {
         found.push(id);
         max_time
     });
@@ -68,7 +68,7 @@ fn check(index: &BoxIndex, boxes: &[Aabb], rng: &mut StdRng, reach: f32) {
     });
 
     let mut first = f64::INFINITY;
-    index.sweep(&start, velocity, max_time, &mut |id| {
+    index.cast_aabb(&start, velocity, max_time, |id| {
         first = times[id as usize].map_or(first, |time| time.min(first));
         max_time.min(first as f32)
     });
@@ -77,7 +77,7 @@ fn check(index: &BoxIndex, boxes: &[Aabb], rng: &mut StdRng, reach: f32) {
 
     let (point, within) = (start.min, rng.random_range(0.0..4.0f32));
     let mut found = Vec::new();
-    index.near(point, within, &mut |id| {
+    index.near(point, within, |id| {
         found.push(id);
         within
     });
@@ -158,25 +158,34 @@ fn answers_equal_a_scan_through_any_history() {
     }
 }
 
-/// Among boxes at the start the lowest id comes first, and the others are not looked at once it is found.
+/// After a visit returned 0, boxes at the start with lower ids are visited, and no others; after a negative number none.
 #[test]
-fn boxes_at_the_start_come_first_and_by_id() {
+fn after_a_box_at_the_start_only_lower_ids_there_are_visited() {
     let mut rng = StdRng::seed_from_u64(5);
     let boxes: Vec<Aabb> = (0..500).map(|_| random_box(&mut rng, 1.0)).collect();
     let mut index = BoxIndex::default();
-    for round in 0..3 {
+    for round in 0..6 {
         index.refresh(&boxes, None);
         let start = Aabb::from_center([0.1 * round as f32; 3], [0.2; 3]);
-        let wanted: Vec<u32> = (0..500)
-            .filter(|&id| boxes[id as usize].is_valid() && start.overlaps(&boxes[id as usize]))
-            .collect();
-        let (all, mut first) = (met(&index, &start, [1.0; 3], 9.0), Vec::new());
-        index.sweep(&start, [1.0; 3], 9.0, &mut |id| {
-            first.push(id);
-            if id < wanted[3] { 9.0 } else { 0.0 }
+        let is_there = |id: &u32| boxes[*id as usize].is_valid() && start.overlaps(&boxes[*id as usize]);
+        let there: Vec<u32> = (0..500).filter(is_there).collect();
+        let all = met(&index, &start, [1.0; 3], 9.0);
+        assert!(there.len() > 20 && all.len() > there.len() && there.iter().all(|id| all.contains(id)));
+        // The box with this id is hit at time 0.
+        let (hit, mut visited) = (there[there.len() / 2], Vec::new());
+        index.cast_aabb(&start, [1.0; 3], 9.0, |id| {
+            visited.push(id);
+            if visited.contains(&hit) { 0.0 } else { 9.0 }
         });
-        assert!(wanted.len() > 20 && all.len() > wanted.len());
-        assert_eq!((&all[..wanted.len()], &first[..]), (&wanted[..], &wanted[..4]));
+        let until = visited.iter().position(|id| *id == hit).expect("the box was visited");
+        assert!(visited[until + 1..].iter().all(|id| *id < hit && there.contains(id)));
+        assert!(there.iter().filter(|id| **id < hit).all(|id| visited.contains(id)));
+        let mut count = 0;
+        index.cast_aabb(&start, [1.0; 3], 9.0, |_| {
+            count += 1;
+            if count < 3 { 9.0 } else { -1.0 }
+        });
+        assert_eq!(count, 3);
         index.sort(&boxes);
     }
 }
@@ -207,7 +216,7 @@ fn cast(index: &mut BoxIndex, boxes: &[Aabb], rays: usize) -> (u64, u64) {
         let along = [0.0; 3].map(|_: f32| rng.random_range(-1.0..1.0));
         let (start, mut first) = (Aabb::new(from, from), f32::MAX);
         let is_counted = ray + 100 >= rays;
-        let looked_at = index.sweep(&start, along, f32::MAX, &mut |id| {
+        let looked_at = index.cast_aabb(&start, along, f32::MAX, |id| {
             visited += u64::from(is_counted);
             first =
                 meets(&start, along, f32::MAX, &boxes[id as usize]).map_or(first, |t| first.min(t as f32));
@@ -279,7 +288,7 @@ fn questions_with_nans_visit_nothing() {
         assert_eq!(met(&index, &start, velocity, time).len(), visits, "{start:?}, {velocity:?}, {time}");
     }
     for (point, distance) in [([f32::NAN; 3], 1.0), ([f32::NEG_INFINITY; 3], 1.0), ([0.5; 3], f32::NAN)] {
-        assert_eq!(index.near(point, distance, &mut |_| 1.0), 0);
+        assert_eq!(index.near(point, distance, |_| 1.0), 0);
     }
 }
 
@@ -341,6 +350,58 @@ fn a_box_without_bounds_meets_no_removed_one() {
     index.refresh(&[unit; 2], None);
     index.refresh(&[unit, Aabb::NOWHERE], Some(&[1]));
     let mut met = vec![];
-    index.overlapping(&Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]), &mut |id| met.push(id));
+    index.overlapping(&Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]), |id| met.push(id));
     assert_eq!(met, [0]);
+}
+
+#[test]
+fn ids_beyond_a_shorter_list_are_not_visited() {
+    let unit = Aabb::new([0.0; 3], [1.0; 3]);
+    let (mut index, mut boxes) = (BoxIndex::default(), vec![unit; 100]);
+    index.refresh(&boxes, None);
+    let visited = |index: &BoxIndex| {
+        let mut met = vec![];
+        index.overlapping(&unit, |id| met.push(id));
+        met.sort_unstable();
+        met
+    };
+    for (len, changed) in [(50, Some(&[][..])), (60, Some(&[59])), (40, Some(&[7])), (30, None), (5, Some(&[]))] {
+        let before = boxes.len();
+        boxes.resize(len, unit);
+        index.refresh(&boxes, changed);
+        let stale = if len > before { before as u32..len as u32 - 1 } else { 0..0 };
+        let wanted: Vec<u32> = (0..len as u32).filter(|id| !stale.contains(id)).collect();
+        assert_eq!(visited(&index), wanted, "{len}");
+    }
+}
+
+/// Gathers eight boxes, and returns them and the box around them.
+fn gathered(simd: impl Simd, boxes: &[Aabb], at: &[u32; 8]) -> ([[f32; 8]; 6], Aabb) {
+    let eight = simd.gather(boxes, at);
+    (eight, simd.around(&eight))
+}
+
+/// Returns the lane of the nearest key, and keys with their values, the farthest first.
+fn ordered(
+    simd: impl Simd,
+    keys: &[f32; 8],
+    limits: &[f32; 8],
+    values: &[u32; 8],
+) -> (Option<usize>, Vec<f32>, Vec<u32>) {
+    let (sorted, order, count) = simd.farthest_first(keys, limits, values);
+    (simd.nearest(keys, limits), sorted[..count].to_vec(), order[..count].to_vec())
+}
+
+#[test]
+fn instructions_gather_and_order_as_the_portable_ones_do() {
+    let mut rng = StdRng::seed_from_u64(11);
+    for _ in 0..2000 {
+        let boxes: Vec<Aabb> = (0..20).map(|_| random_box(&mut rng, 5.0)).collect();
+        let at = [0; 8].map(|_| rng.random_range(0..22u32).checked_sub(1).unwrap_or(u32::MAX));
+        assert_eq!(crate::grid::dispatch!(gathered, &boxes, &at), gathered(Portable, &boxes, &at));
+        let number = |rng: &mut StdRng| [0.0, 1.0, f32::MAX, f32::INFINITY, rng.random()][rng.random_range(0..5)];
+        let [keys, limits] = [(); 2].map(|()| [0; 8].map(|_| number(&mut rng)));
+        let ours = crate::grid::dispatch!(ordered, &keys, &limits, &at);
+        assert_eq!(ours, ordered(Portable, &keys, &limits, &at), "{keys:?} {limits:?}");
+    }
 }

@@ -1,116 +1,140 @@
-//! Walking the nodes that a question meets, nearest first.
+//! Walking the nodes that a query meets, about the nearest first.
 
 use super::BoxIndex;
-use super::node::{LANES, Lanes, NONE, Node, next};
-use super::question::Question;
-use crate::grid::Simd;
+use super::node::{LANES, Lanes, next};
+use super::query::{Cast, Near, Query};
+use crate::Aabb;
+use crate::grid::{Eight, Simd};
 use arrayvec::ArrayVec;
 
-/// Maximum number of nodes that wait: seven for each level, and 2^32 boxes of 448 classes make 14 levels.
+/// Maximum number of nodes that wait: seven for each level and one more, and 2^32 boxes of 448 classes make 14 levels.
 const STACK: usize = 128;
 
-/// A node that waits, and the bound from which on it belongs to the answer.
-type Waiting = (f32, u32);
-
-pub(super) struct Walk<'a, Q> {
-    pub(super) index: &'a BoxIndex,
-    pub(super) question: Q,
-    pub(super) bound: f32,
-    /// Called with the id of a box; returns the new bound.
-    pub(super) visit: &'a mut dyn FnMut(u32) -> f32,
-    /// Boxes at bound 0, of which crowds have many.
-    pub(super) at_start: Vec<u32>,
-    /// Nodes.
-    pub(super) looked_at: u64,
-}
-
-impl<Q: Question> Walk<'_, Q> {
-    /// Visits the boxes, and returns the number of nodes looked at. Boxes at bound 0 come first, by id, so that the lowest id wins among
-    /// them without a look at the others.
-    #[inline(always)]
-    pub(super) fn answer(_: impl Simd, mut walk: Self) -> u64 {
-        let is_still = walk.bound <= 0.0;
-        let bound = std::mem::replace(&mut walk.bound, 0.0);
-        walk.walk::<true>();
-        walk.bound = bound;
-        walk.at_start.sort_unstable();
-        for id in std::mem::take(&mut walk.at_start) {
-            walk.take(id);
-            if walk.bound <= 0.0 && !is_still {
-                return walk.looked_at;
-            }
-        }
-        if !is_still {
-            walk.walk::<false>();
-        }
-        walk.looked_at
-    }
-
-    /// Collects the boxes at bound 0, or visits the others.
-    #[inline(always)]
-    fn walk<const AT_START: bool>(&mut self) {
-        let mut nodes: ArrayVec<Waiting, STACK> = ArrayVec::new();
-        for loose in self.index.loose() {
-            self.look_at::<AT_START>(loose, true, &mut nodes);
-        }
-        nodes.extend(self.index.root().map(|root| (0.0, root)));
-        while let Some((least, node)) = nodes.pop() {
-            if least <= self.bound {
-                self.look_at::<AT_START>(node, self.index.is_leaf(node), &mut nodes);
-            }
-        }
-    }
-
-    /// Takes the boxes of a leaf, or lets the children of a node wait, the nearest on top.
-    #[inline(always)]
-    fn look_at<const AT_START: bool>(
-        &mut self,
-        number: u32,
-        is_leaf: bool,
-        nodes: &mut ArrayVec<Waiting, STACK>,
-    ) {
-        let node = &self.index.nodes[number as usize];
-        self.looked_at += 1;
-        let met = self.met(node, &self.question.least(node));
-        if !is_leaf {
-            return nodes.extend(met);
-        }
-        for (least, id) in met.into_iter().rev() {
-            if AT_START {
-                self.at_start.push(id);
-            } else if least > 0.0 && least <= self.bound {
-                self.take(id);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn take(&mut self, id: u32) {
-        self.bound = (self.visit)(id).min(f32::MAX);
-    }
-
-    /// Returns the lanes within the bound, the farthest first.
-    #[inline(always)]
-    fn met(&self, node: &Node, least: &Lanes) -> ArrayVec<Waiting, LANES> {
-        let mut met = ArrayVec::new();
-        let mut within = (0..LANES).fold(0u32, |mask, i| mask | u32::from(least[i] <= self.bound) << i);
-        while let Some(lane) = next(&mut within) {
-            // A box without bounds meets empty lanes, too.
-            if node.children[lane] != NONE && node.has(lane) {
-                insert(&mut met, (least[lane], node.children[lane]));
-            }
-        }
-        met
-    }
-}
-
-/// Inserts into a list that is sorted from the farthest to the nearest.
+/// Visits the boxes that a moving box meets up to a time; see [`BoxIndex::cast_aabb`].
 #[inline(always)]
-fn insert(sorted: &mut ArrayVec<Waiting, LANES>, one: Waiting) {
-    sorted.push(one);
-    let mut at = sorted.len() - 1;
-    while at > 0 && sorted[at - 1].0 < sorted[at].0 {
-        sorted.swap(at - 1, at);
-        at -= 1;
+pub(super) fn cast(
+    simd: impl Simd,
+    index: &BoxIndex,
+    (cast, max_time): (Cast, f32),
+    visit: impl FnMut(u32) -> f32,
+) -> u64 {
+    Walk::new(index, cast, max_time, visit).answer(simd)
+}
+
+/// Visits the boxes within a distance of a point; see [`BoxIndex::near`].
+#[inline(always)]
+pub(super) fn near(
+    simd: impl Simd,
+    index: &BoxIndex,
+    (point, max_distance): ([f32; 3], f32),
+    visit: impl FnMut(u32) -> f32,
+) -> u64 {
+    let is_place = point[0].is_finite() & point[1].is_finite() & point[2].is_finite();
+    if is_place { Walk::new(index, Near { point }, max_distance, visit).answer(simd) } else { 0 }
+}
+
+/// A walk of a query that orders boxes by time or distance.
+struct Walk<'a, Q, V> {
+    index: &'a BoxIndex,
+    query: Q,
+    /// Called with the id of a box; returns the new bound.
+    visit: V,
+    /// Boxes beyond this value are not wanted. Negative if none is.
+    limit: f32,
+    /// The first box whose visit returned 0, if the walk did not begin with 0. Of the boxes at 0 only those with lower ids are wanted.
+    below: u32,
+    is_overlap: bool,
+    /// Nodes.
+    looked_at: u64,
+}
+
+impl<'a, Q: Query, V: FnMut(u32) -> f32> Walk<'a, Q, V> {
+    /// Makes a walk up to a time or distance.
+    #[inline(always)]
+    fn new(index: &'a BoxIndex, query: Q, bound: f32, visit: V) -> Self {
+        let limit = limit(&query, bound);
+        Self { index, query, visit, limit, below: u32::MAX, is_overlap: bound <= 0.0, looked_at: 0 }
     }
+
+    /// Visits the boxes, and returns the number of nodes looked at.
+    #[inline(always)]
+    fn answer(mut self, simd: impl Simd) -> u64 {
+        let (index, mut loose) = (self.index, self.index.loose());
+        // Nodes that wait, the nearest one last, and the least value at which the query meets each.
+        let mut bounds = ArrayVec::<f32, STACK>::new();
+        let mut nodes = ArrayVec::<u32, STACK>::new();
+        bounds.push(0.0);
+        nodes.extend(index.root());
+        while let Some(mut number) = loose.next().or_else(|| nodes.pop()) {
+            if number < index.end && bounds.pop().is_none_or(|least| least > self.limit) {
+                continue;
+            }
+            loop {
+                self.looked_at += 1;
+                let node = &index.nodes[number as usize];
+                let [least, latest] = self.query.meet(node, self.limit);
+                let Some(nearest) = simd.nearest(&least, &latest) else { break };
+                let (least, children, count) = simd.farthest_first(&least, &latest, &node.children);
+                if index.is_leaf(number) {
+                    self.visit(&least, &children, count);
+                    break;
+                }
+                // The next node is known before the others are in order.
+                number = node.children[nearest];
+                push_all(&mut bounds, &least, count - 1);
+                push_all(&mut nodes, &children, count - 1);
+            }
+        }
+        self.looked_at
+    }
+
+    /// Visits the first boxes of a list, from the last of them on.
+    #[inline(always)]
+    fn visit(&mut self, least: &Lanes, ids: &Eight, count: usize) {
+        for (&least, &id) in least.iter().zip(ids).take(count).rev() {
+            if least > self.limit || least == 0.0 && id >= self.below {
+                continue;
+            }
+            let bound = (self.visit)(id);
+            if bound <= 0.0 && self.below == u32::MAX && !self.is_overlap {
+                self.below = id;
+            }
+            self.limit = limit(&self.query, bound);
+        }
+    }
+}
+
+#[inline(always)]
+fn limit(query: &impl Query, bound: f32) -> f32 {
+    if bound >= 0.0 { query.limit(bound.min(f32::MAX)) } else { -1.0 }
+}
+
+/// Adds the first numbers of eight. (All are copied: a loop of unknown length takes longer.)
+#[inline(always)]
+fn push_all<T: Copy>(list: &mut ArrayVec<T, STACK>, numbers: &[T; LANES], count: usize) {
+    let len = list.len() + count;
+    list.try_extend_from_slice(numbers).expect("a walk waits for few nodes");
+    list.truncate(len);
+}
+
+/// Calls `visit` with the id of each box that overlaps one, and returns the number of nodes looked at.
+#[inline(always)]
+pub(super) fn overlapping(
+    simd: impl Simd,
+    index: &BoxIndex,
+    aabb: &Aabb,
+    mut visit: impl FnMut(u32),
+) -> u64 {
+    let (mut looked_at, mut loose, mut waiting) = (0, index.loose(), ArrayVec::<u32, STACK>::new());
+    waiting.extend(index.root().filter(|_| aabb.is_valid()));
+    while let Some(number) = loose.next().or_else(|| waiting.pop()) {
+        looked_at += 1;
+        let node = &index.nodes[number as usize];
+        let mut met = simd.overlaps_eight(&node.boxes, aabb) & node.used(simd);
+        while let Some(lane) = next(&mut met) {
+            let child = node.children[lane];
+            if index.is_leaf(number) { visit(child) } else { waiting.push(child) }
+        }
+    }
+    looked_at
 }

@@ -59,10 +59,8 @@ impl LookUp {
         for &id in &world.changed {
             let (aabb, now) = (&world.boxes[id as usize], &mut self.partners.now);
             now.clear();
-            // Tested again, because an infinite box meets the empty places of a tree.
-            let mut take =
-                |other: u32| now.extend(aabb.overlaps(&world.boxes[other as usize]).then_some(other));
-            nodes += store.tree.overlapping(aabb, &mut take);
+            nodes += store.tree.overlapping(aabb, |other| now.push(other));
+            now.sort_unstable();
             met += now.len() as u64;
             if nodes + met > max_work {
                 break;
