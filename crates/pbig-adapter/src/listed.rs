@@ -48,10 +48,10 @@ impl<T: Tree> Colliders<T> {
     #[inline(always)]
     pub(crate) fn set_proxy(&mut self, handle: Handle, proxy: Proxy<T::Aabb>, is_listed: bool) {
         match proxy {
-            Proxy::Enabled(aabb, filter) => {
-                let is_fixed = BodyKind::of(&filter) == BodyKind::Fixed;
-                let is_new_and_fixed = is_listed && is_fixed && !self.registry.contains(handle);
-                let own = self.margins.own(&aabb, is_new_and_fixed);
+            Proxy::Enabled(aabb, filter, is_asleep) => {
+                let is_still = is_asleep || BodyKind::of(&filter) == BodyKind::Fixed;
+                let is_new_and_still = is_listed && is_still && !self.registry.contains(handle);
+                let own = self.margins.own(&aabb, is_new_and_still);
                 if let Some(margin) = own {
                     self.set_margin(margin);
                 }

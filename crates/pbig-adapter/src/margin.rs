@@ -16,14 +16,14 @@ pub struct Margins {
 impl Margins {
     /// Returns the margin of a box that has one of its own.
     ///
-    /// A new fixed collider may never move, so it has as much margin as rounding needs: more would only add pairs. Once it has moved, it
-    /// has the margin of others. So has one that is not listed when it is read first, as after a restore: it may have pairs by its margin.
+    /// A new collider of a fixed or sleeping body may never move, so it has as much margin as rounding needs: more would only add pairs.
+    /// Once it has moved, it has the margin of others. So has one that is not listed when it is read first, as after a restore: it may have pairs by its margin.
     #[inline(always)]
-    pub(crate) fn own(&self, aabb: &impl Bounds, is_new_and_fixed: bool) -> Option<f32> {
+    pub(crate) fn own(&self, aabb: &impl Bounds, is_new_and_still: bool) -> Option<f32> {
         // The gap between a box and itself is its negative extent.
         let extent = || (0..self.axes).map(|k| -aabb.gap(aabb, k)).fold(f32::INFINITY, f32::min);
         let adaptive = self.adaptive.map(|[least, most]| (0.125 * extent()).max(least).min(most));
-        if !is_new_and_fixed {
+        if !is_new_and_still {
             return adaptive;
         }
         Some(adaptive.unwrap_or(self.usual).min(aabb.reach() * policy::MARGIN_OF_ROUNDING))

@@ -13,8 +13,8 @@ pub enum Proxy<A> {
     Disabled,
     /// Its AABB is not finite: it keeps its last box, and has this filter.
     Unplaced(ProxyFilter),
-    /// Its AABB without margin, and its filter.
-    Enabled(A, ProxyFilter),
+    /// Its AABB without margin, its filter, and true if its body sleeps.
+    Enabled(A, ProxyFilter, bool),
 }
 
 /// The arguments of an update.

@@ -36,7 +36,10 @@ macro_rules! answer {
                 let pipeline = self.as_query_pipeline(dispatcher, bodies, colliders, filter);
                 match queries.kind {
                     FrameKind::None => 0,
-                    FrameKind::Ray | FrameKind::Rays100 | FrameKind::Rays10000 => queries.hits(|query| {
+                    FrameKind::Ray
+                    | FrameKind::Rays100
+                    | FrameKind::Rays10000
+                    | FrameKind::RaysToMiddle => queries.hits(|query| {
                         pipeline.cast_ray(&ray(query), MAX_DISTANCE_METRES, true).iter().count()
                     }),
                     FrameKind::Cast => queries.hits(|query| {

@@ -26,7 +26,8 @@ impl<'a> Call<'a> {
             None => Proxy::Gone,
             Some(collider) if !collider.is_enabled() => Proxy::Disabled,
             Some(collider) => {
-                Proxy::Enabled(aabb_of(self.params, body, collider), filter_with(body, collider))
+                let is_asleep = body.is_some_and(RigidBody::is_sleeping);
+                Proxy::Enabled(aabb_of(self.params, body, collider), filter_with(body, collider), is_asleep)
             }
         }
     }

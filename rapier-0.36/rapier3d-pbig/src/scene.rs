@@ -23,9 +23,10 @@ impl Call<'_> {
         if !collider.is_enabled() {
             return Proxy::Disabled;
         }
-        let filter = filter_with(parent_of(self.bodies, collider), collider);
+        let body = parent_of(self.bodies, collider);
+        let (filter, is_asleep) = (filter_with(body, collider), body.is_some_and(RigidBody::is_sleeping));
         match self.aabb_of(collider) {
-            Some(aabb) => Proxy::Enabled(from_tree(&aabb), filter),
+            Some(aabb) => Proxy::Enabled(from_tree(&aabb), filter, is_asleep),
             // Rapier's own broad phase also keeps the last box. Rapier disables such a collider at the end of the step.
             None => Proxy::Unplaced(filter),
         }

@@ -1,4 +1,4 @@
-//! The margin of new fixed colliders: in f32 and f64, read by one thread and by several, and after a rescan.
+//! The margin of new colliders of fixed and of sleeping bodies: in f32 and f64, read by one thread and by several, and after a rescan.
 
 use super::*;
 use crate::{Groups, Margins, WideAabb, filter_of};
@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 
 const MARGIN: f32 = 0.1;
 
-/// Colliders on a lattice: in turns fixed and dynamic, and all listed.
+/// Colliders on a lattice: in turns fixed, dynamic and asleep, and all listed.
 struct Lattice<A> {
     count: usize,
     of: fn([f32; 3]) -> A,
@@ -19,9 +19,9 @@ impl<A: Bounds> Lattice<A> {
     }
 
     fn proxy(&self, i: usize) -> (Handle, Proxy<A>) {
-        let kind = [BodyKind::Fixed, BodyKind::Dynamic][i % 2];
+        let kind = if i.is_multiple_of(3) { BodyKind::Fixed } else { BodyKind::Dynamic };
         let groups = Groups { memberships: 1, mask: 1, mode: TestMode::And };
-        ((i as u32, 0).into(), Proxy::Enabled(self.aabb(i), filter_of(None, kind, 0, groups)))
+        ((i as u32, 0).into(), Proxy::Enabled(self.aabb(i), filter_of(None, kind, 0, groups), i % 3 == 2))
     }
 }
 
@@ -74,13 +74,13 @@ impl<A: Bounds> Tree for NoTree<A> {
     fn update(&mut self, _: impl Iterator<Item = (u32, A)>) {}
 }
 
-/// Returns the least and the largest margin of the fixed and of the dynamic colliders.
-fn margins<A: Bounds>(colliders: &Colliders<NoTree<A>>, scene: &Lattice<A>) -> [[f32; 2]; 2] {
-    let mut margins = [[f32::MAX, 0.0]; 2];
+/// Returns the least and the largest margin of the fixed, of the dynamic and of the sleeping colliders.
+fn margins<A: Bounds>(colliders: &Colliders<NoTree<A>>, scene: &Lattice<A>) -> [[f32; 2]; 3] {
+    let mut margins = [[f32::MAX, 0.0]; 3];
     for (handle, fat) in colliders.boxes() {
         let i = handle.index as usize;
         let margin = fat.to_f32().max[0] - scene.aabb(i).to_f32().max[0];
-        let [least, most] = &mut margins[i % 2];
+        let [least, most] = &mut margins[i % 3];
         (*least, *most) = (least.min(margin), most.max(margin));
     }
     margins
@@ -94,19 +94,20 @@ fn check<A: Bounds>(of: fn([f32; 3]) -> A, count: usize) {
     let margins_of_update = Margins { usual: MARGIN, ..Margins::default() };
     for call in 0..2 {
         colliders.update(&scene, &margins_of_update, |_| panic!("no pair"));
-        let [fixed, dynamic] = margins(&colliders, &scene);
-        assert!(fixed[1] < 0.001 * MARGIN && is_common(dynamic), "call {call}: {fixed:?}, {dynamic:?}");
+        let all = margins(&colliders, &scene);
+        let is_rounding = |[_, most]: [f32; 2]| most < 0.001 * MARGIN;
+        assert!(is_rounding(all[0]) && is_common(all[1]) && is_rounding(all[2]), "call {call}: {all:?}");
     }
     // A world with fewer colliders is another one, which is read as a whole.
     scene.count -= 1;
     colliders.update(&scene, &margins_of_update, |_| panic!("no pair"));
-    let [fixed, dynamic] = margins(&colliders, &scene);
+    let all = margins(&colliders, &scene);
     assert_eq!(colliders.counts.totals.rescans, 1);
-    assert!(is_common(fixed) && is_common(dynamic), "after a rescan: {fixed:?}, {dynamic:?}");
+    assert!(all.into_iter().all(is_common), "after a rescan: {all:?}");
 }
 
 #[test]
-fn new_fixed_colliders_have_the_margin_of_rounding() {
+fn new_colliders_that_stay_have_the_margin_of_rounding() {
     let wide = |at: [f32; 3]| {
         let at = at.map(f64::from);
         WideAabb { min: at, max: at.map(|x| x + 0.5) }
