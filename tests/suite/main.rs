@@ -17,6 +17,7 @@ mod incremental;
 mod kernels;
 mod motions;
 mod order;
+mod peak;
 mod planted;
 mod queries;
 mod random_worlds;

@@ -6,6 +6,7 @@ use crate::grid::{
 };
 use crate::holder::Holder;
 use crate::index::BoxIndex;
+use crate::memory::Scratch;
 use crate::outcome::{End, Outcome};
 use crate::pairs::{Grouping, Groups};
 use crate::parallel::available_threads;
@@ -79,15 +80,20 @@ impl<'a> Request<'a> {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Store {
     pub(crate) grid: EditedGrid,
-    two_grids: TwoGrids,
+    two_grids: Scratch<TwoGrids>,
     pub(crate) tree: BoxIndex,
     /// Both sets in one list, for a tree.
-    both_sets: Vec<Aabb>,
+    both_sets: Scratch<Vec<Aabb>>,
     /// Tests of the last search that was done.
     pub(crate) work: u64,
 }
 
 impl Store {
+    /// Gives back memory that the boxes of the last search did not need.
+    pub(crate) fn settle(&mut self) {
+        self.grid.settle();
+    }
+
     /// Renames the boxes that a search has left: `names[id]` is the new id of the box `id`.
     pub(crate) fn rename(&mut self, holder: Holder, names: &[u32]) {
         match holder {
@@ -248,6 +254,12 @@ impl AllPairs {
     pub(crate) fn gather(&mut self, grouping: Grouping, groups: &mut Groups) -> usize {
         let workers = self.hits.len();
         groups.gather(grouping, &mut self.hits, workers)
+    }
+
+    /// Forgets the pairs, and gives memory back if as many are expected.
+    pub(crate) fn settle(&mut self, pairs: usize) {
+        let share = pairs / self.hits.len().max(1);
+        self.hits.iter_mut().for_each(|hits| hits.settle(share));
     }
 
     /// Takes pairs that a device has found.

@@ -35,8 +35,8 @@ pub enum Order {
 pub struct Limits {
     /// Maximum number of boxes, and of ids of [`crate::BroadPhase`].
     pub max_boxes: u64,
-    /// Maximum number of pairs that a [`crate::Finder`] lists, or a [`crate::BroadPhase`] keeps: 8 bytes each, up to 32 while they
-    /// are sorted.
+    /// Maximum number of pairs that a [`crate::Finder`] lists, or a [`crate::BroadPhase`] keeps. A listed pair takes 8 bytes, and up to
+    /// 32 while the list is made; a kept one 8 bytes, and up to 70 in an update in which most pairs begin or end.
     pub max_pairs: u64,
 }
 

@@ -2,6 +2,7 @@
 
 use crate::all_pairs::{AllPairs, Request, Store};
 use crate::device_slot::{DeviceSlot, are_in_order};
+use crate::memory::Scratch;
 use crate::outcome::Outcome;
 use crate::pair_device::{PairDevice, SearchRequest};
 use crate::pairs::{Grouping, Groups};
@@ -51,9 +52,9 @@ pub struct Finder {
     config: Config,
     device: DeviceSlot,
     store: Store,
-    all_pairs: AllPairs,
-    groups: Groups,
-    sets: Sets,
+    all_pairs: Scratch<AllPairs>,
+    groups: Scratch<Groups>,
+    sets: Scratch<Sets>,
     pairs: Vec<Pair>,
     /// Pairs of two sets: the ids of a [`crate::CrossPair`].
     pairs_between: Vec<Pair>,
@@ -210,6 +211,22 @@ impl Finder {
     /// Returns the pairs of the last call that lists pairs of one set; none if it failed.
     pub fn pairs(&self) -> &[Pair] {
         &self.pairs
+    }
+
+    /// Gives back the memory that the lists of the last call do not need.
+    ///
+    /// ```
+    /// use pbig_core::{Aabb, Finder};
+    /// let mut finder = Finder::default();
+    /// finder.find(&[Aabb::new([0.0; 3], [1.0; 3]); 500])?;
+    /// finder.shrink_to_fit();
+    /// assert_eq!(finder.pairs().len(), 500 * 499 / 2);
+    /// # Ok::<(), pbig_core::Error>(())
+    /// ```
+    pub fn shrink_to_fit(&mut self) {
+        (self.store, self.all_pairs, self.groups, self.sets) = Default::default();
+        self.pairs.shrink_to_fit();
+        self.pairs_between.shrink_to_fit();
     }
 
     /// Returns what the last call did.

@@ -68,6 +68,7 @@ mod grid;
 mod holder;
 mod id_set;
 mod index;
+mod memory;
 pub mod oracle;
 mod outcome;
 #[cfg(all(target_family = "wasm", target_os = "unknown"))]

@@ -36,12 +36,11 @@ macro_rules! answer {
                 let pipeline = self.as_query_pipeline(dispatcher, bodies, colliders, filter);
                 match queries.kind {
                     FrameKind::None => 0,
-                    FrameKind::Ray
-                    | FrameKind::Rays100
-                    | FrameKind::Rays10000
-                    | FrameKind::RaysToMiddle => queries.hits(|query| {
-                        pipeline.cast_ray(&ray(query), MAX_DISTANCE_METRES, true).iter().count()
-                    }),
+                    FrameKind::Ray | FrameKind::Rays100 | FrameKind::Rays10000 | FrameKind::RaysToMiddle => {
+                        queries.hits(|query| {
+                            pipeline.cast_ray(&ray(query), MAX_DISTANCE_METRES, true).iter().count()
+                        })
+                    }
                     FrameKind::Cast => queries.hits(|query| {
                         let (at, along, ball) = cast(query);
                         pipeline.cast_shape(&at, &along, &ball, cast_options()).iter().count()

@@ -18,6 +18,7 @@ use crate::device_slot::DeviceSlot;
 use crate::finder::check_count;
 use crate::grid::prefetch;
 use crate::holder::Holder;
+use crate::memory::Scratch;
 use crate::pairs::{Comparison, Kept};
 use crate::policy;
 use crate::report::Report;
@@ -74,7 +75,7 @@ pub struct BroadPhase {
     last_events: usize,
     given_up: policy::GivenUp,
     engines: Engines,
-    comparison: Comparison,
+    comparison: Scratch<Comparison>,
     kept: Kept,
     events: Events,
     report: Report,
@@ -249,7 +250,7 @@ impl BroadPhase {
         self.kept.shrink();
         (self.store, self.engines) = (Store::default(), Engines::default());
         self.device.changed = Vec::new();
-        self.comparison = Comparison::default();
+        self.comparison = Scratch::default();
         if self.holder != Holder::Device {
             self.holder = Holder::Nothing;
         }

@@ -17,17 +17,35 @@ impl BroadPhase {
         self.events.added.clear();
         self.events.removed.clear();
         self.begin_report();
-        if !self.world.changed.is_empty() {
-            self.kept.reserve_ids(self.world.ids());
-            let done = self.find_events();
-            if let Err(error) = done {
-                self.fail();
-                return Err(error);
-            }
-            self.finish();
+        // An engine writes into the memory of the last events.
+        self.swap_events();
+        let done = self.update_pairs();
+        if done.is_err() {
+            self.fail();
         }
+        self.settle();
+        self.swap_events();
         self.report.pairs = self.kept.len() as u64;
-        Ok(&self.events)
+        done.map(|()| &self.events)
+    }
+
+    fn swap_events(&mut self) {
+        self.comparison.added.swap_list(&mut self.events.added);
+        self.comparison.removed.swap_list(&mut self.events.removed);
+    }
+
+    /// Leaves the events, and forgets the changes.
+    fn update_pairs(&mut self) -> Result<(), Error> {
+        self.comparison.clear();
+        if self.world.changed.is_empty() {
+            return Ok(());
+        }
+        self.kept.reserve_ids(self.world.ids());
+        self.find_events()?;
+        self.last_events = self.comparison.added.len() + self.comparison.removed.len();
+        self.world.forget_changes();
+        self.world.keep_old = self.old_to_keep();
+        Ok(())
     }
 
     fn find_events(&mut self) -> Result<(), Error> {
@@ -118,16 +136,16 @@ impl BroadPhase {
     /// Makes the next update begin from the boxes and the kept pairs alone.
     fn fail(&mut self) {
         self.holder = Holder::Nothing;
-        self.report.pairs = self.kept.len() as u64;
+        self.comparison.clear();
     }
 
-    /// Hands the events over, and forgets the changes.
-    fn finish(&mut self) {
-        std::mem::swap(&mut self.events.added, &mut self.comparison.added);
-        std::mem::swap(&mut self.events.removed, &mut self.comparison.removed);
-        self.last_events = self.events.added.len() + self.events.removed.len();
-        self.world.forget_changes();
-        self.world.keep_old = self.old_to_keep();
+    /// Gives back a piece of the memory that a peak has left.
+    fn settle(&mut self) {
+        let (pairs, events) = (self.kept.len(), self.last_events);
+        self.engines.settle(pairs);
+        self.comparison.settle(events);
+        self.kept.settle(events);
+        self.store.settle();
     }
 
     /// Returns the number of old states to keep until the next update.

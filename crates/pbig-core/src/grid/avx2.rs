@@ -212,11 +212,12 @@ impl Simd for Avx2 {
             let two = |a, b, of: unsafe fn(__m128, __m128) -> __m128| {
                 of(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b))
             };
-            let four = |a, b, of: unsafe fn(__m128, __m128) -> __m128| {
-                of(_mm_movelh_ps(a, b), _mm_movehl_ps(b, a))
-            };
-            let min: [f32; 4] = bytemuck::cast(four(two(a, b, _mm_min_ps), two(c, c, _mm_min_ps), _mm_min_ps));
-            let max: [f32; 4] = bytemuck::cast(four(two(d, e, _mm_max_ps), two(f, f, _mm_max_ps), _mm_max_ps));
+            let four =
+                |a, b, of: unsafe fn(__m128, __m128) -> __m128| of(_mm_movelh_ps(a, b), _mm_movehl_ps(b, a));
+            let min: [f32; 4] =
+                bytemuck::cast(four(two(a, b, _mm_min_ps), two(c, c, _mm_min_ps), _mm_min_ps));
+            let max: [f32; 4] =
+                bytemuck::cast(four(two(d, e, _mm_max_ps), two(f, f, _mm_max_ps), _mm_max_ps));
             Aabb::new([min[0], min[1], min[2]], [max[0], max[1], max[2]])
         }
     }
@@ -245,7 +246,8 @@ impl Simd for Avx2 {
             let (found, words) = words(keys, limits);
             let all_bits = _mm256_set1_epi32(-1);
             let beyond = _mm256_cmpeq_epi32(words, all_bits);
-            let count = BLOCK - (_mm256_movemask_ps(_mm256_castsi256_ps(beyond)) as u32).count_ones() as usize;
+            let count =
+                BLOCK - (_mm256_movemask_ps(_mm256_castsi256_ps(beyond)) as u32).count_ones() as usize;
             // The largest word is to be first.
             let order = sorted(_mm256_or_si256(_mm256_xor_si256(words, all_bits), beyond));
             let order = _mm256_xor_si256(order, all_bits);

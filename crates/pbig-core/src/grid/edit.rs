@@ -41,6 +41,13 @@ pub(super) struct Spill {
     occupied: Vec<u64>,
 }
 
+impl EditedGrid {
+    /// Gives back memory that the boxes of the last search did not need.
+    pub(crate) fn settle(&mut self) {
+        self.grid.settle();
+    }
+}
+
 impl Spill {
     pub(super) fn is_empty(&self) -> bool {
         self.records.len() == self.free.len()

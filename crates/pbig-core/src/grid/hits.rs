@@ -7,6 +7,7 @@
 use super::record::Record;
 use super::simd::{BLOCK, Simd, eight_from, prefetch};
 use crate::boxes::share_no_key;
+use crate::memory::Pool;
 use crate::pairs::Grouping;
 use crate::policy::search::{WORK_OF_EXACT_TEST, WORK_OF_VAGUE_TEST};
 use crate::{Keys, Pair, ProxyFilter};
@@ -78,7 +79,7 @@ pub(crate) struct Hits {
     queries: Vec<u32>,
     places: Vec<u32>,
     /// The pairs, in no particular order.
-    pub(crate) pairs: Vec<Pair>,
+    pub(crate) pairs: Pool<Pair>,
     /// By group of `a` (`a >> group_shift`): pairs found. Empty if pairs are not counted by group.
     pub(crate) groups: Vec<u32>,
     pub(crate) group_shift: u32,
@@ -148,6 +149,13 @@ impl Hits {
         self.group_shift = shift;
         (self.tests, self.vague, self.runs, self.overlaps, self.handed_over) = (0, 0, 0, 0, 0);
         (self.accounted, self.is_full) = (0, false);
+    }
+
+    /// Forgets the pairs, and gives back memory if as many as `needed` are expected.
+    pub(crate) fn settle(&mut self, needed: usize) {
+        let needed = needed.max(self.pairs.len());
+        self.pairs.clear();
+        self.pairs.settle(needed);
     }
 
     /// Returns the work of the boxes in cells, in tests of codes.
@@ -306,7 +314,7 @@ impl Hits {
 
     /// Takes pairs that were found elsewhere.
     pub(crate) fn take(&mut self, pairs: Vec<Pair>) {
-        self.pairs = pairs;
+        *self.pairs = pairs;
         self.count_groups(0);
     }
 

@@ -42,6 +42,7 @@ pub(crate) use simd::{BLOCK, Eight, EightBoxes, Portable, Simd, dispatch, prefet
 pub(crate) use spacing::GridPlan;
 pub use spacing::NeighbourScan;
 
+use crate::memory::{Pool, Scratch};
 use build::BucketCounts;
 
 /// A grid with its buffers.
@@ -49,23 +50,32 @@ use build::BucketCounts;
 pub(crate) struct Grid {
     pub(crate) plan: GridPlan,
     /// By slot, sorted by cell; where boxes stay in buckets, by bucket. Longer than `len`.
-    records: Vec<Record>,
+    records: Pool<Record>,
     /// By slot; tombstones beyond `len`, so that a block can be read anywhere. While the
     /// grid is built, and where boxes stay in buckets, the keys of the boxes.
-    codes: Vec<u64>,
+    codes: Pool<u64>,
     /// By cell: its first slot. Out of date where boxes stay in buckets.
-    starts: Vec<u32>,
+    starts: Pool<u32>,
     /// Slots in use.
     pub(crate) len: usize,
     /// Boxes too large for the cells.
     pub(crate) oversize: Vec<Record>,
     /// The records by bucket, of the last build.
-    coarse: Vec<Record>,
+    coarse: Scratch<Pool<Record>>,
     counts: Vec<BucketCounts>,
     bucket_starts: Vec<u32>,
 }
 
 impl Grid {
+    /// Gives back memory that the boxes of the last build did not need.
+    fn settle(&mut self) {
+        let (len, cells) = (self.len, self.starts.len().min(self.plan.cells.count() + 4));
+        self.records.settle(len);
+        self.coarse.settle(len);
+        self.codes.settle(len + 2 * BLOCK);
+        self.starts.settle(cells);
+    }
+
     /// Returns the codes of eight slots.
     ///
     /// # Safety

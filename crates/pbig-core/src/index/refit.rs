@@ -134,7 +134,8 @@ impl BoxIndex {
         });
         dispatch!(read, &mut self.nodes[end..], &mut self.bounds[end..], boxes);
         dispatch!(read_inner, &mut self.nodes[leaves..end], &mut self.bounds, leaves);
-        let grown = self.bounds.iter().zip(&mut self.extents).map(|(bounds, extent)| outgrows(bounds, extent));
+        let grown =
+            self.bounds.iter().zip(&mut self.extents).map(|(bounds, extent)| outgrows(bounds, extent));
         self.grown += grown.map(usize::from).sum::<usize>();
     }
 

@@ -365,7 +365,9 @@ fn ids_beyond_a_shorter_list_are_not_visited() {
         met.sort_unstable();
         met
     };
-    for (len, changed) in [(50, Some(&[][..])), (60, Some(&[59])), (40, Some(&[7])), (30, None), (5, Some(&[]))] {
+    for (len, changed) in
+        [(50, Some(&[][..])), (60, Some(&[59])), (40, Some(&[7])), (30, None), (5, Some(&[]))]
+    {
         let before = boxes.len();
         boxes.resize(len, unit);
         index.refresh(&boxes, changed);
@@ -399,7 +401,8 @@ fn instructions_gather_and_order_as_the_portable_ones_do() {
         let boxes: Vec<Aabb> = (0..20).map(|_| random_box(&mut rng, 5.0)).collect();
         let at = [0; 8].map(|_| rng.random_range(0..22u32).checked_sub(1).unwrap_or(u32::MAX));
         assert_eq!(crate::grid::dispatch!(gathered, &boxes, &at), gathered(Portable, &boxes, &at));
-        let number = |rng: &mut StdRng| [0.0, 1.0, f32::MAX, f32::INFINITY, rng.random()][rng.random_range(0..5)];
+        let number =
+            |rng: &mut StdRng| [0.0, 1.0, f32::MAX, f32::INFINITY, rng.random()][rng.random_range(0..5)];
         let [keys, limits] = [(); 2].map(|()| [0; 8].map(|_| number(&mut rng)));
         let ours = crate::grid::dispatch!(ordered, &keys, &limits, &at);
         assert_eq!(ours, ordered(Portable, &keys, &limits, &at), "{keys:?} {limits:?}");

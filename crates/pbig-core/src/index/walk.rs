@@ -119,12 +119,7 @@ fn push_all<T: Copy>(list: &mut ArrayVec<T, STACK>, numbers: &[T; LANES], count:
 
 /// Calls `visit` with the id of each box that overlaps one, and returns the number of nodes looked at.
 #[inline(always)]
-pub(super) fn overlapping(
-    simd: impl Simd,
-    index: &BoxIndex,
-    aabb: &Aabb,
-    mut visit: impl FnMut(u32),
-) -> u64 {
+pub(super) fn overlapping(simd: impl Simd, index: &BoxIndex, aabb: &Aabb, mut visit: impl FnMut(u32)) -> u64 {
     let (mut looked_at, mut loose, mut waiting) = (0, index.loose(), ArrayVec::<u32, STACK>::new());
     waiting.extend(index.root().filter(|_| aabb.is_valid()));
     while let Some(number) = loose.next().or_else(|| waiting.pop()) {

@@ -5,28 +5,29 @@ use super::kept::{Kept, Rows};
 use super::row;
 use crate::Pair;
 use crate::grid::{Simd, dispatch};
+use crate::memory::Pool;
 use crate::parallel::SharedSlice;
 use std::ops::Range;
 
 /// The result of a comparison. `added` and `removed` are sorted.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Comparison {
-    pub(crate) added: Vec<Pair>,
-    pub(crate) removed: Vec<Pair>,
+    pub(crate) added: Pool<Pair>,
+    pub(crate) removed: Pool<Pair>,
     /// Kept pairs of removed boxes, which end without an event.
-    pub(crate) dropped: Vec<Pair>,
+    pub(crate) dropped: Pool<Pair>,
     /// By group.
     parts: Vec<Part>,
     /// Buffers of a sort.
-    sorted: Vec<Pair>,
+    sorted: Pool<Pair>,
     counts: Vec<u32>,
 }
 
 /// The events of one group.
 #[derive(Clone, Debug, Default)]
 struct Part {
-    added: Vec<Pair>,
-    removed: Vec<Pair>,
+    added: Pool<Pair>,
+    removed: Pool<Pair>,
 }
 
 impl Comparison {
@@ -63,6 +64,14 @@ impl Comparison {
         kept.adopt_next(names, &self.added, &self.removed);
     }
 
+    /// Gives back a piece of the memory that fewer events than before do not need. The last update had `events`.
+    pub(crate) fn settle(&mut self, events: usize) {
+        let parts = self.parts.iter_mut().flat_map(|part| [&mut part.added, &mut part.removed]);
+        parts.for_each(Pool::settle_and_clear);
+        let lists = [&mut self.added, &mut self.removed, &mut self.dropped, &mut self.sorted];
+        lists.into_iter().for_each(|list| list.settle(events));
+    }
+
     /// Forgets all events.
     pub(crate) fn clear(&mut self) {
         self.added.clear();
@@ -88,6 +97,8 @@ impl Comparison {
 
     fn gather(&mut self) {
         self.clear();
+        self.added.reserve_exact(self.parts.iter().map(|part| part.added.len()).sum());
+        self.removed.reserve_exact(self.parts.iter().map(|part| part.removed.len()).sum());
         for part in &self.parts {
             self.added.extend_from_slice(&part.added);
             self.removed.extend_from_slice(&part.removed);

@@ -4,6 +4,7 @@ use super::row::{self, SHORT};
 use crate::Pair;
 use crate::grid::{Hits, Simd, dispatch};
 use crate::id_set::IdSet;
+use crate::memory::Pool;
 use crate::parallel::{SharedSlice, ensure_scratch, run, run_with};
 use std::ops::{Range, RangeInclusive};
 
@@ -56,7 +57,7 @@ impl Span {
 pub(crate) struct Groups {
     pub(super) grouping: Grouping,
     /// Pairs, group by group.
-    pairs: Vec<Pair>,
+    pairs: Pool<Pair>,
     /// By group: its first pair; then the number of pairs.
     starts: Vec<u32>,
     /// By thread.
@@ -87,6 +88,14 @@ impl Groups {
             }
         });
         count
+    }
+
+    /// Forgets the pairs, and gives back memory if as many as `needed` are expected.
+    pub(crate) fn settle(&mut self, needed: usize) {
+        let needed = needed.max(self.len());
+        self.starts.clear();
+        self.pairs.settle(needed);
+        self.sorters.iter_mut().for_each(Sorter::settle);
     }
 
     /// Renames the `b` of all pairs; their `a`, by which they are grouped, keep the names of the search.
@@ -132,7 +141,7 @@ impl Groups {
             spans.resize(groups.grouping.ids_of(group).len(), Span::default());
             ensure_scratch(others, pairs.len(), 0);
             groups.sort::<true>(group, sorter, spans, &mut others[..pairs.len()], 0);
-            for ((to, &a), &b) in pairs.iter_mut().zip(&sorter.firsts).zip(&*others) {
+            for ((to, &a), &b) in pairs.iter_mut().zip(&*sorter.firsts).zip(&**others) {
                 to.write(Pair { a, b });
             }
             (sorter.spans, sorter.others) = (std::mem::take(spans), std::mem::take(others));
@@ -166,6 +175,7 @@ impl Groups {
             ensure_scratch(&mut sorter.firsts, pairs.len(), 0);
         }
         ensure_scratch(&mut sorter.unsorted, pairs.len() + SHORT, 0);
+        sorter.largest = sorter.largest.max(pairs.len());
         dispatch!(sort_rows::<LIST>, pairs, (first_id, base), spans, others, sorter);
     }
 }
@@ -174,13 +184,24 @@ impl Groups {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sorter {
     spans: Vec<Span>,
-    others: Vec<u32>,
+    others: Pool<u32>,
     /// The `a` of each pair, in order.
-    firsts: Vec<u32>,
+    firsts: Pool<u32>,
     /// The `b` of each pair, by row, in no order within it.
-    unsorted: Vec<u32>,
+    unsorted: Pool<u32>,
     /// Empty: for rows that are long.
     long: IdSet,
+    /// Number of pairs of the largest group since memory was last given back.
+    largest: usize,
+}
+
+impl Sorter {
+    fn settle(&mut self) {
+        let needed = std::mem::take(&mut self.largest) + SHORT;
+        [&mut self.others, &mut self.firsts, &mut self.unsorted]
+            .into_iter()
+            .for_each(|list| list.settle(needed));
+    }
 }
 
 /// Sorts pairs by the highest bits of `a`, into `to`.
@@ -202,7 +223,7 @@ fn sort_roughly(pairs: &[Pair], to: &mut Vec<Pair>, counts: &mut Vec<u32>, ids: 
 }
 
 /// Sorts pairs: roughly by `a` first if they are many.
-pub(super) fn sort(pairs: &mut Vec<Pair>, sorted: &mut Vec<Pair>, counts: &mut Vec<u32>, ids: usize) {
+pub(super) fn sort(pairs: &mut Pool<Pair>, sorted: &mut Pool<Pair>, counts: &mut Vec<u32>, ids: usize) {
     let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
     if pairs.len() < 1 << RADIX_BITS {
         return pairs.sort_unstable_by_key(word);
@@ -259,16 +280,17 @@ mod tests {
 
     #[test]
     fn many_events_are_sorted_whatever_the_number_of_ids() {
-        let (mut sorted, mut counts) = (vec![], vec![]);
+        let (mut sorted, mut counts) = (Pool::default(), vec![]);
         for ids in [2047, 2048, 2049, (1 << 20) - 1, 1 << 20, (1 << 20) + 1] {
             for len in [0, 10, 2047, 2048, 5000] {
                 let id = |i: u64| (i * 0x9E37_79B9 % ids) as u32;
-                let mut pairs: Vec<Pair> = (0..len).map(|i| Pair::new(id(i), id(i + len))).collect();
+                let mut pairs = Pool::default();
+                pairs.extend((0..len).map(|i| Pair::new(id(i), id(i + len))));
                 pairs.push(Pair { a: ids as u32 - 2, b: ids as u32 - 1 });
-                let mut wanted = pairs.clone();
+                let mut wanted = pairs.to_vec();
                 wanted.sort_unstable();
                 sort(&mut pairs, &mut sorted, &mut counts, ids as usize);
-                assert_eq!(pairs, wanted, "{len} pairs of {ids} ids");
+                assert_eq!(*pairs, wanted, "{len} pairs of {ids} ids");
             }
         }
     }

@@ -3,6 +3,7 @@
 use super::groups::Span;
 use crate::Pair;
 use crate::grid::prefetch;
+use crate::memory::{Pool, Scratch};
 use std::sync::OnceLock;
 
 /// Minimum room of a row that has outgrown its place.
@@ -22,7 +23,7 @@ const AHEAD: usize = 8;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
     pub(super) spans: Vec<Span>,
-    pub(super) pool: Vec<u32>,
+    pub(super) pool: Pool<u32>,
 }
 
 impl Rows {
@@ -113,7 +114,7 @@ impl Rows {
             pool.extend_from_slice(self.pool.get(span.range()).unwrap_or(&[]));
             span.start = start;
         }
-        self.pool = pool;
+        *self.pool = pool;
     }
 }
 
@@ -128,9 +129,9 @@ pub(crate) struct Kept {
     lower: Vec<u32>,
     len: usize,
     /// Buffers of the next comparison.
-    pub(super) next: Rows,
+    pub(super) next: Scratch<Rows>,
     /// Changed pairs, `b` first.
-    turned: Vec<Pair>,
+    turned: Scratch<Pool<Pair>>,
 }
 
 impl Kept {
@@ -191,7 +192,8 @@ impl Kept {
             span.start = next;
             next += len;
         }
-        let mut pool = vec![0; next as usize];
+        let mut pool = Pool::default();
+        pool.resize(next as usize, 0);
         for pair in self.iter() {
             let span = &mut spans[pair.b as usize];
             pool[span.range().end] = pair.a;
@@ -235,7 +237,7 @@ impl Kept {
 
     /// Takes the compared rows for the kept ones: all, or those of the ids in `names`. No other id has a pair.
     pub(super) fn adopt_next(&mut self, names: Option<&[u32]>, added: &[Pair], removed: &[Pair]) {
-        std::mem::swap(&mut self.forward, &mut self.next);
+        std::mem::swap(&mut self.forward, &mut *self.next);
         if let Some(names) = names {
             std::mem::swap(&mut self.forward.spans, &mut self.next.spans);
             let rows = names.iter().zip(&self.next.spans);
@@ -266,10 +268,17 @@ impl Kept {
         self.count(pairs, &[]);
     }
 
+    /// Gives back a piece of the memory that fewer pairs than before do not need. The last update had `events` of a kind.
+    pub(crate) fn settle(&mut self, events: usize) {
+        let needed = self.forward.pool.len();
+        self.forward.pool.settle(needed);
+        self.next.pool.settle(self.len);
+        self.turned.settle(events);
+    }
+
     /// Gives back memory that the kept pairs do not need.
     pub(crate) fn shrink(&mut self) {
-        self.next = Rows::default();
-        self.turned = Vec::new();
+        (self.next, self.turned) = Default::default();
         self.backward.take();
         self.forward.pool.shrink_to_fit();
         self.forward.spans.shrink_to_fit();

@@ -11,6 +11,7 @@ mod tree;
 use super::world::World;
 use crate::all_pairs::Store;
 use crate::holder::Holder;
+use crate::memory::Scratch;
 use crate::outcome::Outcome;
 use crate::pairs::{Comparison, Kept};
 use crate::{Config, Engine};
@@ -23,12 +24,17 @@ use tree::LookUp;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Engines {
     sweep: Sweep,
-    pub(super) edit: Edit,
-    tree: LookUp,
-    rebuild: Rebuild,
+    pub(super) edit: Scratch<Edit>,
+    tree: Scratch<LookUp>,
+    rebuild: Scratch<Rebuild>,
 }
 
 impl Engines {
+    /// Gives memory back if as many pairs are expected.
+    pub(super) fn settle(&mut self, pairs: usize) {
+        self.rebuild.settle(pairs);
+    }
+
     pub(super) fn run(&mut self, engine: Engine, task: &mut Task<'_>) -> Outcome {
         match engine {
             Engine::Sweep => self.sweep.run(task),

@@ -45,6 +45,12 @@ impl Rebuild {
         outcome
     }
 
+    /// Gives memory back if as many pairs are expected.
+    pub(super) fn settle(&mut self, pairs: usize) {
+        self.all_pairs.settle(pairs);
+        self.groups.settle(pairs);
+    }
+
     /// Compares the found pairs with the kept ones.
     fn compare(&mut self, task: &mut Task<'_>, holder: Holder, is_listed: bool) {
         stage!("diff");

@@ -1,0 +1,156 @@
+//! Memory that a peak has left: it is given back, a piece an update, once it was not needed for a while. Scratch is not copied.
+
+use std::ops::{Deref, DerefMut};
+
+/// Number of updates after which an earlier need is forgotten, at least.
+const WINDOW: usize = 64;
+
+/// Parts of the window. The need of a part is forgotten at once.
+const PARTS: usize = 8;
+
+/// Maximum ratio of a list's capacity to what the window needed.
+const MAX_SPARE: usize = 4;
+
+/// Number of pieces in which memory is given back. Giving back a page takes time, so all at once could take longer than an update.
+const PIECES: usize = 80;
+
+/// Part of the need, as one in this number, that is left beside it.
+const SPARE: usize = 4;
+
+/// Capacity that is never given back, in elements.
+const SMALL: usize = 4096;
+
+/// A list whose length differs from update to update, and what it needed in the last ones.
+#[derive(Clone, Debug)]
+pub(crate) struct Pool<T> {
+    list: Vec<T>,
+    /// By part of the window: the largest number of elements needed.
+    needs: [usize; PARTS],
+    updates: usize,
+    /// Elements to give back in each update, until the capacity is little more than the need. 0 if it was not too large since the need
+    /// grew.
+    piece: usize,
+}
+
+impl<T> Default for Pool<T> {
+    fn default() -> Self {
+        Self { list: Vec::new(), needs: [0; PARTS], updates: 0, piece: 0 }
+    }
+}
+
+impl<T> Pool<T> {
+    /// Notes how many elements an update needed, which stay. Gives a piece of the memory back if the window needed much less than there is.
+    pub(crate) fn settle(&mut self, needed: usize) {
+        if self.piece > 0 && self.needs.iter().all(|earlier| *earlier < needed) {
+            self.piece = 0;
+        }
+        let part = self.updates / (WINDOW / PARTS) % PARTS;
+        let is_new = self.updates.is_multiple_of(WINDOW / PARTS);
+        self.needs[part] = if is_new { needed } else { self.needs[part].max(needed) };
+        self.updates += 1;
+        // Until the first window has passed, the largest need is not known.
+        if self.updates > WINDOW && self.list.capacity() > SMALL {
+            self.shrink(self.needs.into_iter().max().unwrap_or(0));
+        }
+    }
+
+    fn shrink(&mut self, most: usize) {
+        let (capacity, wanted) = (self.list.capacity(), most + most / SPARE + SMALL);
+        if capacity > MAX_SPARE * most + SMALL {
+            self.piece = self.piece.max((capacity - wanted).div_ceil(PIECES));
+        }
+        if self.piece > 0 && capacity > wanted {
+            let left = wanted.max(capacity - self.piece);
+            self.list.truncate(left);
+            self.list.shrink_to(left);
+        }
+    }
+
+    /// As [`Pool::settle`], for as many elements as there are. Removes them.
+    pub(crate) fn settle_and_clear(&mut self) {
+        let needed = self.list.len();
+        self.list.clear();
+        self.settle(needed);
+    }
+
+    /// Swaps the elements with those of a list of a caller.
+    pub(crate) fn swap_list(&mut self, list: &mut Vec<T>) {
+        std::mem::swap(&mut self.list, list);
+    }
+}
+
+impl<T> Deref for Pool<T> {
+    type Target = Vec<T>;
+
+    #[inline(always)]
+    fn deref(&self) -> &Vec<T> {
+        &self.list
+    }
+}
+
+impl<T> DerefMut for Pool<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut Vec<T> {
+        &mut self.list
+    }
+}
+
+/// Buffers that keep nothing from one call to the next but memory. A clone has none.
+#[derive(Debug, Default)]
+pub(crate) struct Scratch<T>(T);
+
+impl<T: Default> Clone for Scratch<T> {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl<T> Deref for Scratch<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for Scratch<T> {
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pool(capacity: usize) -> Pool<u8> {
+        Pool { list: vec![0; capacity], ..Pool::default() }
+    }
+
+    #[test]
+    fn a_list_shrinks_piece_by_piece_after_a_window_with_little_need() {
+        let mut pool = pool(1_000_000);
+        pool.settle(1_000_000);
+        let mut capacities = vec![];
+        for _ in 0..200 {
+            pool.clear();
+            pool.resize(10_000, 7);
+            pool.settle(10_000);
+            assert_eq!(pool.len(), 10_000);
+            capacities.push(pool.capacity());
+        }
+        assert!(capacities[..55].iter().all(|capacity| *capacity >= 1_000_000), "{capacities:?}");
+        assert!(capacities[199] <= 12_500 + SMALL, "{capacities:?}");
+        let pieces = capacities.windows(2).map(|two| two[0] - two[1]);
+        assert!(pieces.max().is_some_and(|piece| piece <= 1_000_000 / PIECES), "{capacities:?}");
+    }
+
+    #[test]
+    fn a_need_that_comes_back_within_the_window_keeps_its_room() {
+        let mut pool = pool(100_000);
+        for update in 0..1000 {
+            pool.settle(if update % 50 == 0 { 90_000 } else { 10 });
+            assert_eq!(pool.capacity(), 100_000, "update {update}");
+        }
+    }
+}
