@@ -5,7 +5,9 @@
 use super::Mesh;
 use super::reading::{MAX_LINE_BYTES, number};
 use crate::files::{Lines, Location, brief, too_long};
+use std::collections::BTreeMap;
 use std::io::BufRead;
+use std::str::SplitWhitespace;
 
 /// What a line should have.
 const EXPECTED: &str = "a vertex, a face or a rod";
@@ -17,24 +19,24 @@ const QUIET: &str = "vt vn g s mg o usemtl mtllib usemap maplib bevel c_interp d
 pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
     let mut lines = Lines::new(reader, MAX_LINE_BYTES, EXPECTED);
     let mut file = Reading { mesh: Mesh { first_number: 1, ..Mesh::default() }, ..Reading::default() };
-    let (mut whole, mut first) = (String::new(), 1);
+    let mut whole = String::new();
     while lines.advance()? {
         // Comments and names may be in any encoding.
         let line = String::from_utf8_lossy(&lines.bytes);
         let line = without_comment(line.trim_start_matches('\u{feff}')).trim_end();
         if whole.is_empty() {
-            first = lines.number;
+            file.line = lines.number;
         }
         match line.strip_suffix('\\') {
             Some(_) if whole.len() > MAX_LINE_BYTES => {
-                return Err(format!("line {first}: {}", too_long(MAX_LINE_BYTES, EXPECTED)));
+                return Err(file.at(too_long(MAX_LINE_BYTES, EXPECTED)));
             }
             // Without the blank the last number of this line and the first of the next would be one.
             Some(begun) => whole.extend([begun, " "]),
-            None => file.take(&(std::mem::take(&mut whole) + line), first)?,
+            None => file.take(&(std::mem::take(&mut whole) + line))?,
         }
     }
-    file.take(&whole, first)?;
+    file.take(&whole)?;
     file.finish()
 }
 
@@ -50,112 +52,94 @@ fn without_comment(line: &str) -> &str {
 #[derive(Default)]
 struct Reading {
     mesh: Mesh,
+    /// Number of the present line; of the first, if it goes on in others.
+    line: usize,
     /// The largest vertex that a line names, and that line. A later line may define it.
     furthest: (i64, usize),
-    /// Words at the beginning of lines that are skipped, with the number of these lines and the first of them.
-    skipped: Vec<(String, usize, usize)>,
+    /// Words at the beginning of lines that are skipped, with the number of these lines.
+    skipped: BTreeMap<String, usize>,
+    /// The first of these words.
+    first_skipped: Option<String>,
 }
 
 impl Reading {
-    fn take(&mut self, line: &str, number: usize) -> Result<(), String> {
+    fn at(&self, what: String) -> String {
+        format!("line {}: {what}", self.line)
+    }
+
+    fn take(&mut self, line: &str) -> Result<(), String> {
         let mut words = line.split_whitespace();
-        let Some(first) = words.next() else { return Ok(()) };
-        let taken = match first {
-            "v" => self.vertex(words, number),
-            "f" | "fo" => self.face(words, number),
-            "l" => self.rods(words, number),
-            _ => {
-                self.skip(first, number);
+        let taken = match words.next() {
+            Some("v") => self.add_vertex(words),
+            Some("f" | "fo") => self.add_face(words),
+            Some("l") => self.add_rods(words),
+            Some(word) if !QUIET.split(' ').any(|quiet| quiet == word) => {
+                self.first_skipped.get_or_insert_with(|| brief(word));
+                *self.skipped.entry(brief(word)).or_default() += 1;
                 Ok(())
             }
+            _ => Ok(()),
         };
-        taken.map_err(|what| format!("line {number}: {what}"))
+        taken.map_err(|what| self.at(what))
     }
 
     /// Reads three coordinates. A weight or a colour may follow.
-    fn vertex<'a>(&mut self, words: impl Iterator<Item = &'a str>, line: usize) -> Result<(), String> {
+    fn add_vertex(&mut self, words: SplitWhitespace<'_>) -> Result<(), String> {
         let numbers: Vec<f64> = words.map(number).collect::<Result<_, _>>()?;
         let [x, y, z, ..] = numbers[..] else {
             return Err(format!("expected 3 coordinates, found {}", numbers.len()));
         };
-        self.mesh.add_vertex([x, y, z], Location::Line(line));
+        self.mesh.add_vertex([x, y, z], Location::Line(self.line));
         Ok(())
     }
 
-    fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>, line: usize) -> Result<(), String> {
-        let corners = self.vertices(words, line)?;
-        self.mesh.add_face(&corners, Location::Line(line))
+    fn add_face(&mut self, words: SplitWhitespace<'_>) -> Result<(), String> {
+        let corners: Vec<u32> = words.map(|word| self.index(word)).collect::<Result<_, _>>()?;
+        self.mesh.add_face(&corners, Location::Line(self.line))
     }
 
-    fn rods<'a>(&mut self, words: impl Iterator<Item = &'a str>, line: usize) -> Result<(), String> {
-        let path = self.vertices(words, line)?;
+    fn add_rods(&mut self, words: SplitWhitespace<'_>) -> Result<(), String> {
+        let path: Vec<u32> = words.map(|word| self.index(word)).collect::<Result<_, _>>()?;
         if path.len() < 2 {
             return Err(format!("expected a rod of 2 vertices or more, found {}", path.len()));
         }
-        path.windows(2).for_each(|ends| self.mesh.add_rod([ends[0], ends[1]], Location::Line(line)));
+        path.windows(2).for_each(|ends| self.mesh.add_rod([ends[0], ends[1]], Location::Line(self.line)));
         Ok(())
     }
 
-    fn vertices<'a>(
-        &mut self,
-        words: impl Iterator<Item = &'a str>,
-        line: usize,
-    ) -> Result<Vec<u32>, String> {
-        words.map(|word| self.index(word, line)).collect()
-    }
-
     /// Returns the vertex of `vertex/texture/normal`: counted from 1, or backwards from the last one with -1.
-    fn index(&mut self, word: &str, line: usize) -> Result<u32, String> {
+    fn index(&mut self, word: &str) -> Result<u32, String> {
         let number = word.split('/').next().and_then(|vertex| vertex.parse::<i64>().ok());
         let number = number.ok_or_else(|| format!("'{}' is not the number of a vertex", brief(word)))?;
         let before = self.mesh.vertices.len() as i64;
-        let place = if number < 0 { before.saturating_add(number) + 1 } else { number };
-        if place < 1 {
-            return Err(format!("vertex {number} does not exist; {}", counting(before, number)));
+        let from_start = if number < 0 { before.saturating_add(number) + 1 } else { number };
+        if number == 0 {
+            return Err("vertex 0 does not exist; the first is 1".into());
         }
-        if place > self.furthest.0 {
-            self.furthest = (place, line);
+        if from_start < 1 {
+            return Err(format!("vertex {number} does not exist; the lines before have {before} vertices"));
         }
-        // Larger ones are refused at the end.
-        Ok(u32::try_from(place - 1).unwrap_or(u32::MAX))
-    }
-
-    fn skip(&mut self, word: &str, line: usize) {
-        if QUIET.split(' ').any(|quiet| quiet == word) {
-            return;
+        if from_start > self.furthest.0 {
+            self.furthest = (from_start, self.line);
         }
-        let known = self.skipped.iter().position(|(known, ..)| known == word);
-        // A file that is no `.obj` has any number of first words.
-        match known.or((self.skipped.len() > 8).then_some(8)) {
-            Some(i) => self.skipped[i].1 += 1,
-            None if self.skipped.len() == 8 => self.skipped.push(("other lines".into(), 1, line)),
-            None => self.skipped.push((brief(word), 1, line)),
-        }
+        // A larger one does not exist, which is told at the end.
+        Ok(u32::try_from(from_start - 1).unwrap_or(u32::MAX))
     }
 
     fn finish(mut self) -> Result<Mesh, String> {
         let vertices = self.mesh.vertices.len();
         if vertices == 0 {
-            let begins =
-                |(word, _, line): &(String, usize, usize)| format!("; line {line} begins with '{word}'");
-            let found = self.skipped.first().map_or(String::new(), begins);
+            let found = self.first_skipped.map_or(String::new(), |word| format!(", found '{word}'"));
             return Err(format!("no vertices; expected lines that begin with `v`{found}"));
         }
-        let (number, line) = self.furthest;
-        if number > vertices as i64 {
+        if let (number, line) = self.furthest
+            && number > vertices as i64
+        {
             return Err(format!("line {line}: vertex {number} does not exist; the file has {vertices}"));
         }
-        let names: Vec<String> =
-            self.skipped.iter().map(|(word, lines, _)| format!("{word} ({lines})")).collect();
-        self.mesh.skip(&names, "");
+        let names = self.skipped.iter().map(|(word, lines)| format!("{word} ({lines})"));
+        self.mesh.skip(&names.collect::<Vec<_>>(), "");
         Ok(self.mesh)
-    }
-}
-
-fn counting(before: i64, number: i64) -> String {
-    match number {
-        0 => "the first is 1".into(),
-        _ => format!("the lines before have {before} vertices"),
     }
 }
 

@@ -71,10 +71,13 @@ impl Mesh {
         let face = match *corners {
             [a, b, c] => [a, b, c, NO_KEY],
             [a, b, c, d] => [a, b, c, d],
+            _ if corners.len() < 3 => {
+                return Err(format!("expected a face of 3 or 4 vertices, found {}", corners.len()));
+            }
             _ => {
-                let found =
-                    if corners.len() > 4 { "more; divide it".into() } else { corners.len().to_string() };
-                return Err(format!("expected a face of 3 or 4 vertices, found {found}"));
+                return Err(
+                    "a face of more than 4 vertices; divide it into triangles or quadrilaterals".into()
+                );
             }
         };
         if corners.iter().enumerate().any(|(i, corner)| corners[..i].contains(corner)) {

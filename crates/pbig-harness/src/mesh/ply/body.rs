@@ -18,25 +18,6 @@ pub(super) enum Body<R> {
     },
 }
 
-/// The reason why a row cannot be read.
-enum Fault {
-    /// The file ends.
-    End,
-    Wrong(String),
-}
-
-impl From<String> for Fault {
-    fn from(what: String) -> Self {
-        Self::Wrong(what)
-    }
-}
-
-impl From<io::Error> for Fault {
-    fn from(error: io::Error) -> Self {
-        if error.kind() == ErrorKind::UnexpectedEof { Self::End } else { Self::Wrong(one_line(error)) }
-    }
-}
-
 impl<R: BufRead> Body<R> {
     /// Reads a row, and returns its place. `take` gets the values of some columns, each with its index in `columns`.
     pub(super) fn row(
@@ -46,22 +27,22 @@ impl<R: BufRead> Body<R> {
         columns: &[usize],
         take: impl FnMut(usize, f64) -> Result<(), String>,
     ) -> Result<Location, String> {
-        let place = self.begin(row);
-        let read = place.and_then(|place| self.values(element, columns, take).map(|()| place));
-        read.map_err(|fault| match fault {
-            Fault::End => {
-                format!("the file ends after {row} of {} rows of element {}", element.rows, element.name)
-            }
-            Fault::Wrong(what) => element.at(self.place(row), &what),
-        })
+        let (rows, name) = (element.rows, &element.name);
+        let ends = || format!("the file ends after {row} of {rows} rows of element {name}");
+        if !self.has_more()? {
+            return Err(ends());
+        }
+        let place = self.place(row);
+        self.values(element, columns, take).map_err(|error| match error.kind() {
+            ErrorKind::UnexpectedEof => ends(),
+            _ => element.at(place, &one_line(error)),
+        })?;
+        Ok(place)
     }
 
     /// Returns what is left behind the last row, in words; nothing if that is all.
     pub(super) fn rest(&mut self) -> Result<Vec<String>, String> {
-        let is_more = match self {
-            Self::Text { .. } => self.next_line()?,
-            Self::Binary { reader, .. } => !reader.fill_buf().map_err(one_line)?.is_empty(),
-        };
+        let is_more = self.has_more()?;
         let from = match self {
             Self::Text { lines, .. } => format!("all from line {}, which", lines.number),
             Self::Binary { .. } => "bytes at the end, which".into(),
@@ -69,18 +50,12 @@ impl<R: BufRead> Body<R> {
         Ok(is_more.then(|| format!("{from} no element of the header has")).into_iter().collect())
     }
 
-    /// Moves to the next row.
-    fn begin(&mut self, row: u64) -> Result<Location, Fault> {
-        let is_there = match self {
-            Self::Text { .. } => self.next_line()?,
-            Self::Binary { .. } => true,
+    /// Returns true if the file goes on. In a text, moves to the next line that is not blank.
+    fn has_more(&mut self) -> Result<bool, String> {
+        let (lines, at) = match self {
+            Self::Text { lines, at } => (lines, at),
+            Self::Binary { reader, .. } => return Ok(!reader.fill_buf().map_err(one_line)?.is_empty()),
         };
-        if is_there { Ok(self.place(row)) } else { Err(Fault::End) }
-    }
-
-    /// Moves to the next line that is not blank. Returns false if there is none.
-    fn next_line(&mut self) -> Result<bool, String> {
-        let Self::Text { lines, at } = self else { return Ok(false) };
         *at = 0;
         while lines.advance()? {
             if !lines.bytes.trim_ascii().is_empty() {
@@ -102,32 +77,34 @@ impl<R: BufRead> Body<R> {
         element: &Element,
         columns: &[usize],
         mut take: impl FnMut(usize, f64) -> Result<(), String>,
-    ) -> Result<(), Fault> {
+    ) -> io::Result<()> {
         for (column, property) in element.properties.iter().enumerate() {
             let wanted = columns.iter().position(|wanted| *wanted == column);
-            let length = property.count.map(|scalar| self.value(property, scalar));
-            for _ in 0..length.map_or(Ok(1), |length| self::length(length?, property))? {
+            let length = match property.count {
+                Some(scalar) => length(self.value(property, scalar)?, property)?,
+                None => 1,
+            };
+            for _ in 0..length {
                 let value = self.value(property, property.scalar)?;
-                wanted.map_or(Ok(()), |wanted| take(wanted, value))?;
+                if let Some(wanted) = wanted {
+                    take(wanted, value).map_err(io::Error::other)?;
+                }
             }
         }
-        match self.word() {
-            Some(word) => {
-                Err(format!("'{}' is one value too many for element {}", brief(&word), element.name).into())
-            }
-            None => Ok(()),
-        }
+        let Some(word) = self.word() else { return Ok(()) };
+        let what = format!("'{}' is one value too many for element {}", brief(&word), element.name);
+        Err(io::Error::other(what))
     }
 
-    fn value(&mut self, property: &Property, scalar: Scalar) -> Result<f64, Fault> {
+    fn value(&mut self, property: &Property, scalar: Scalar) -> io::Result<f64> {
         if let Self::Binary { reader, is_big } = self {
-            return Ok(binary(reader, scalar, *is_big)?);
+            return binary(reader, scalar, *is_big);
         }
-        let about = |what| format!("property {}: {what}", property.name);
+        let about = |what| io::Error::other(format!("property {}: {what}", property.name));
         let word = self.word().ok_or_else(|| about("the line has too few values".into()))?;
         let number = number(&word).map_err(about)?;
         // As in a binary file.
-        Ok(if matches!(scalar, Scalar::F32) { f64::from(number as f32) } else { number })
+        Ok(if matches!(scalar, Scalar::Float) { f64::from(number as f32) } else { number })
     }
 
     /// Returns the next word of a line of text.
@@ -143,29 +120,32 @@ impl<R: BufRead> Body<R> {
 }
 
 /// Returns the length of a list.
-fn length(value: f64, property: &Property) -> Result<u64, Fault> {
-    let is_length = value >= 0.0 && value.fract() == 0.0 && value < f64::from(u32::MAX);
-    let what =
-        || format!("property {}: a list cannot have {} values", property.name, brief(&value.to_string()));
-    is_length.then_some(value as u64).ok_or_else(|| what().into())
+fn length(value: f64, property: &Property) -> io::Result<u64> {
+    let is_length = value >= 0.0 && value.fract() == 0.0 && value <= f64::from(u32::MAX);
+    let what = || {
+        let found = brief(&value.to_string());
+        io::Error::other(format!("property {}: a list cannot have {found} values", property.name))
+    };
+    is_length.then_some(value as u64).ok_or_else(what)
 }
 
 fn binary(reader: &mut impl Read, scalar: Scalar, is_big: bool) -> io::Result<f64> {
+    let length = match scalar {
+        Scalar::Signed(length) | Scalar::Unsigned(length) => length,
+        Scalar::Float => 4,
+        Scalar::Double => 8,
+    };
     let mut bytes = [0; 8];
-    let used = &mut bytes[..scalar.size()];
-    reader.read_exact(used)?;
+    reader.read_exact(&mut bytes[..length])?;
     if is_big {
-        used.reverse();
+        bytes[..length].reverse();
     }
     let bits = u64::from_le_bytes(bytes);
+    let unused = 64 - 8 * length;
     Ok(match scalar {
-        Scalar::I8 => f64::from(bits as i8),
-        Scalar::U8 => f64::from(bits as u8),
-        Scalar::I16 => f64::from(bits as i16),
-        Scalar::U16 => f64::from(bits as u16),
-        Scalar::I32 => f64::from(bits as i32),
-        Scalar::U32 => f64::from(bits as u32),
-        Scalar::F32 => f64::from(f32::from_bits(bits as u32)),
-        Scalar::F64 => f64::from_bits(bits),
+        Scalar::Signed(_) => ((bits << unused) as i64 >> unused) as f64,
+        Scalar::Unsigned(_) => bits as f64,
+        Scalar::Float => f64::from(f32::from_bits(bits as u32)),
+        Scalar::Double => f64::from_bits(bits),
     })
 }
