@@ -47,6 +47,7 @@ fn a_triangle_is_read_in_every_form_that_programs_write() {
         plain.replace('\n', "\r"),
         plain.replace('\n', "\r\n"),
         plain.replace("ply", "\u{feff}PLY").replace("element", "\n \telement").replace("float x", "float X"),
+        plain.replace("vertex 3", "Vertex 3").replace("face 1", "FACE 1").replace("ascii", "ASCII"),
         plain.replace("3 0 1 2", "3.0 0.0 1.0 2.0").replace("uchar", "float32"),
         plain.replace("vertex_indices", "vertex_index").replace("ascii 1.0", "ascii"),
         ply(&format!("{FACE}property float a.b:c\n"), "3 0 1 2 7\n"),

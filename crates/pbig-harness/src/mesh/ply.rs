@@ -25,7 +25,7 @@ pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
         Format::Text => Body::Text { lines, at: 0 },
         Format::Binary { is_big } => Body::Binary { reader: lines.into_rest().map_err(one_line)?, is_big },
     };
-    let vertices = header.elements.iter().find(|element| element.name == "vertex");
+    let vertices = header.elements.iter().find(|element| element.name.eq_ignore_ascii_case("vertex"));
     let vertices = vertices.ok_or("no element vertex in the header")?.rows;
     let mut rows = Rows { body, mesh: Mesh::default(), vertices };
     header.elements.iter().filter(|element| element.rows > 0).try_for_each(|element| rows.add(element))?;
@@ -43,7 +43,7 @@ struct Rows<R> {
 
 impl<R: BufRead> Rows<R> {
     fn add(&mut self, element: &Element) -> Result<(), String> {
-        match element.name.as_str() {
+        match element.name.to_ascii_lowercase().as_str() {
             "vertex" => self.add_vertices(element),
             "face" => self.add_faces(element),
             "tristrips" => self.add_strips(element),

@@ -9,7 +9,7 @@ use std::path::Path;
 /// Maximum length of a line, in bytes. A strip of triangles may have millions of vertices.
 pub(super) const MAX_LINE_BYTES: usize = 64 << 20;
 
-/// Number of names that a list of skipped things has at most.
+/// Number of names that a list of skipped things shows.
 const MOST_NAMES: usize = 8;
 
 impl Mesh {
@@ -55,7 +55,7 @@ impl Mesh {
             (true, false) => Some("no faces; rods have edges and vertices".to_owned()),
             _ => None,
         };
-        let skipped = (!self.skipped.is_empty()).then(|| format!("not read: {}", list(&self.skipped)));
+        let skipped = (!self.skipped.is_empty()).then(|| format!("not read: {}", self.skipped.join("; ")));
         [invalid, doubled, dropped, empty, skipped].into_iter().flatten().collect()
     }
 
@@ -110,7 +110,7 @@ fn count(seen: &mut Option<(usize, Location)>, place: Location) {
 /// Returns the first names, and how many there are more.
 fn list(names: &[String]) -> String {
     let (shown, rest) = names.split_at(names.len().min(MOST_NAMES));
-    let more = if rest.is_empty() { String::new() } else { format!(" and {} others", rest.len()) };
+    let more = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
     let plain = |name: &String| name.chars().map(|c| if c.is_control() { '?' } else { c }).collect();
     format!("{}{more}", shown.iter().map(plain).collect::<Vec<String>>().join(", "))
 }

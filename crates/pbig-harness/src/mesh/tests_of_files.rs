@@ -121,7 +121,7 @@ fn a_long_list_of_what_is_not_read_is_cut() {
     let notes = read("a.obj", format!("v 0 0 0\n{lines}").as_bytes()).expect("a vertex").notes();
     assert_eq!(notes[0], "no faces and no rods");
     assert!(
-        notes[1].starts_with("not read: word0? (1), ") && notes[1].ends_with(" (1) and 92 others"),
+        notes[1].starts_with("not read: word0? (1), ") && notes[1].ends_with(" (1) and 92 more"),
         "{notes:?}"
     );
 }

@@ -78,6 +78,7 @@ pub(super) fn read(lines: &mut Lines<impl BufRead>) -> Result<Header, String> {
             [word] if lines.number == 1 && word.eq_ignore_ascii_case("ply") => {}
             _ if lines.number == 1 => return Err(at("a .ply file begins with a line `ply`".into())),
             [] | ["comment" | "obj_info", ..] => {}
+            ["format", ..] if format.is_some() => return Err(at("a second line `format`".into())),
             ["format", name, ..] => format = Some(format_of(name).map_err(at)?),
             ["element", name, rows] => add(name, rows, &mut elements).map_err(at)?,
             ["property", ref rest @ ..] => {
@@ -100,7 +101,7 @@ pub(super) fn read(lines: &mut Lines<impl BufRead>) -> Result<Header, String> {
 
 fn format_of(name: &str) -> Result<Format, String> {
     let known = "ascii, binary_little_endian or binary_big_endian";
-    match name {
+    match name.to_ascii_lowercase().as_str() {
         "ascii" => Ok(Format::Text),
         "binary_little_endian" => Ok(Format::Binary { is_big: false }),
         "binary_big_endian" => Ok(Format::Binary { is_big: true }),
@@ -110,7 +111,7 @@ fn format_of(name: &str) -> Result<Format, String> {
 
 fn add(name: &str, rows: &str, elements: &mut Vec<Element>) -> Result<(), String> {
     let name = brief(name);
-    if elements.iter().any(|element| element.name == name) {
+    if elements.iter().any(|element| element.name.eq_ignore_ascii_case(&name)) {
         return Err(format!("a second element {name}"));
     }
     let wrong = |_| format!("'{}' is not a number of rows", brief(rows));
@@ -129,7 +130,7 @@ fn property(words: &[&str]) -> Result<Property, String> {
 
 fn scalar(word: &str) -> Result<Scalar, String> {
     let known = "char, uchar, short, ushort, int, uint, float, double, or int8 to float64";
-    Ok(match word {
+    Ok(match word.to_ascii_lowercase().as_str() {
         "char" | "int8" => Scalar::Signed(1),
         "uchar" | "uint8" => Scalar::Unsigned(1),
         "short" | "int16" => Scalar::Signed(2),
