@@ -60,11 +60,11 @@ pub(crate) fn run(args: &Args, path: &Path) -> Result<(), Failure> {
     report(args, &frames, &elements, &all)
 }
 
+/// Returns the elements of one frame, or of two.
 fn elements(frames: &[Frame<'_>]) -> Result<MeshElements, Failure> {
-    let next = frames.get(1);
-    let elements = frames[0].1.elements(next.map(|(_, mesh)| mesh));
-    let named = next.map_or("", |(path, _)| path.to_str().unwrap_or_default());
-    elements.map_err(|what| Failure::Input(format!("{named}: {what}")))
+    let elements = frames[0].1.elements(frames.get(1).map(|(_, mesh)| mesh));
+    let next = frames[frames.len() - 1].0.display();
+    elements.map_err(|what| Failure::Input(format!("{next}: {what}")))
 }
 
 /// Refuses a vertex that is not a number in a frame.

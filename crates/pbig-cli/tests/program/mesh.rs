@@ -100,7 +100,7 @@ fn what_is_odd_or_not_read_is_told() {
             &["rods from a vertex to itself, left out: 1, the first in line 5"],
         ),
         ("a.obj", OBJ.into(), &["no faces and no rods"]),
-        ("a.obj", format!("{nan}f 1 2 3\n"), &["vertices with a NaN: 1, the first is 2 in line 2"]),
+        ("a.obj", format!("{nan}f 1 2 3\n"), &["vertices with a NaN: 1, the first is vertex 2 in line 2"]),
         (
             "a.obj",
             format!("{OBJ}f 1 2 3\np 1\nvp 0\ncurv 0 1 1 2\np 2\n"),

@@ -43,7 +43,8 @@ impl Mesh {
     pub fn notes(&self) -> Vec<String> {
         let invalid = self.first_invalid.map(|(vertex, place)| {
             let all = self.vertices.iter().filter(|at| at.iter().any(|x| x.is_nan())).count();
-            format!("vertices with a NaN: {all}, the first is {} in {place}", vertex + self.first_number)
+            let number = vertex + self.first_number;
+            format!("vertices with a NaN: {all}, the first is vertex {number} in {place}")
         });
         let twice = |what: &str, seen: Option<(usize, Location)>| {
             seen.map(|(all, place)| format!("{what}: {all}, the first in {place}"))
