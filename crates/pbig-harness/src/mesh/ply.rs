@@ -46,7 +46,7 @@ impl<R: BufRead> Rows<R> {
         match element.name.to_ascii_lowercase().as_str() {
             "vertex" => self.add_vertices(element),
             "face" => self.add_faces(element),
-            "tristrips" => self.add_strips(element),
+            "tristrips" if element.column(&CORNERS, true).is_ok() => self.add_strips(element),
             "edge" if element.column(&ENDS[..1], false).is_ok() => self.add_rods(element),
             _ => self.skip(element),
         }

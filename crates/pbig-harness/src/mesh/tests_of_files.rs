@@ -78,6 +78,16 @@ fn strips_become_triangles_and_edges_become_rods() {
 }
 
 #[test]
+fn rods_and_strips_that_name_no_vertices_are_not_read() {
+    let head = HEAD.replace("face 1", "tristrips 1").replace("vertex_indices", "colours");
+    let head = head.replace("end_header", "element edge 2\nproperty uchar red\nend_header");
+    let mesh =
+        read("a.ply", format!("{head}{}1 7\n7\n7\n", "0 0 0 9\n".repeat(3)).as_bytes()).expect("vertices");
+    let told = "not read: red of element vertex; element tristrips (1); element edge (2)";
+    assert_eq!(mesh.notes(), ["no faces and no rods", told]);
+}
+
+#[test]
 fn obj_files_are_read_with_every_form_of_face() {
     let text = b"\xef\xbb\xbf# \xe4\no name\nv 0 0 0\nv 1 0 0\nv 0 1 0 1.0\nvn 0 0 1\nv 1 1 1\nf 1 2 3\nf 2//1 4//1 -2/5/1\nf 1 2 \\\n 3 4 # all\nusemtl x\n";
     let mesh = read("a.obj", text).expect("a mesh");
