@@ -60,14 +60,18 @@ fn obj(boxes: &[Aabb]) -> String {
     let vertex = |[x, y, z]: [f32; 3]| format!("v {x} {y} {z}\n");
     let face = |corners: [usize; 3]| format!("f {}//1 {} -1\n", corners[0] + 1, corners[1] + 1);
     let vertices = boxes.iter().flat_map(|aabb| [aabb.min, aabb.max]).map(vertex);
-    vertices.chain(triangles(boxes).into_iter().map(face)).collect()
+    vertices.chain(triangles(boxes).into_iter().map(face)).chain(["l 1 2 \\\n-1 # rods\n".into()]).collect()
 }
+
+/// A row of the element `edge` and one of `tristrips`.
+const RODS_AND_STRIPS: [&[i32]; 2] = [&[0, 1], &[4, 0, 1, -1, 1]];
 
 fn ply(boxes: &[Aabb], is_binary: bool) -> Vec<u8> {
     let (format, faces) = (if is_binary { "binary_little_endian" } else { "ascii" }, triangles(boxes));
     let head = format!(
         "ply\nformat {format} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+         element face {}\nproperty list uchar int vertex_indices\nelement edge 1\nproperty int vertex1\nproperty int vertex2\n\
+         element tristrips 1\nproperty list int int vertex_indices\nend_header\n",
         2 * boxes.len(),
         faces.len()
     );
@@ -75,11 +79,14 @@ fn ply(boxes: &[Aabb], is_binary: bool) -> Vec<u8> {
     let rows: Vec<u8> = if is_binary {
         let floats = vertices.flatten().flat_map(f32::to_le_bytes);
         let face = |face: [usize; 3]| [vec![3], face.map(|v| (v as u32).to_le_bytes()).concat()].concat();
-        floats.chain(faces.into_iter().flat_map(face)).collect()
+        let rest = RODS_AND_STRIPS.concat().into_iter().flat_map(i32::to_le_bytes);
+        floats.chain(faces.into_iter().flat_map(face)).chain(rest).collect()
     } else {
         let vertices = vertices.map(|[x, y, z]| format!("{x} {y} {z}\n"));
         let faces = faces.into_iter().map(|[a, b, c]| format!("3 {a} {b} {c}\n"));
-        vertices.chain(faces).collect::<String>().into_bytes()
+        let row = |row: &&[i32]| row.iter().map(|number| format!("{number} ")).chain(["\n".into()]).collect();
+        let rest = RODS_AND_STRIPS.iter().map(row);
+        vertices.chain(faces).chain(rest).collect::<String>().into_bytes()
     };
     [head.into_bytes(), rows].concat()
 }

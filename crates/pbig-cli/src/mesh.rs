@@ -3,7 +3,7 @@
 use crate::options::{check_output, plan_text, print_summary, with_threads};
 use crate::pairs::{Args, repeated};
 use pbig_core::{Finder, Report};
-use pbig_harness::files::{BOXES_OR_PAIRS, ending, is_stdout, write_csv, write_id_pairs};
+use pbig_harness::files::{BOXES_OR_PAIRS, Location, ending, is_stdout, write_csv, write_id_pairs};
 use pbig_harness::mesh::{Elements, Mesh, MeshElements};
 use pbig_harness::prelude::*;
 use std::path::Path;
@@ -40,31 +40,49 @@ struct Found {
     report: Report,
 }
 
+/// A mesh and the file that it comes from.
+type Frame<'a> = (&'a Path, Mesh);
+
 pub(crate) fn run(args: &Args, path: &Path) -> Result<(), Failure> {
     check_outputs(args, path)?;
-    let mesh = Mesh::read(path)?;
-    let next = args.next.as_deref().map(|next| Mesh::read(next).map(|mesh| (next, mesh))).transpose()?;
-    let elements = mesh.elements(next.as_ref().map(|(_, mesh)| mesh));
-    let named = next.as_ref().map_or(path, |(path, _)| path);
-    let elements = elements.map_err(|what| format!("{}: {what}", named.display()))?;
+    let frames = [Some(path), args.next.as_deref()].into_iter().flatten();
+    let frames: Vec<Frame<'_>> =
+        frames.map(|path| Ok((path, Mesh::read(path)?))).collect::<Result<_, String>>()?;
     if args.strict {
-        refuse_invalid(path, &elements)?;
+        frames.iter().try_for_each(refuse_invalid)?;
     }
+    let elements = elements(&frames)?;
     let find_all = || args.elements.iter().map(|kinds| find(args, path, kinds, &elements)).collect();
     let all: Vec<Found> = with_threads(args.threads, find_all)?;
     if let Some(output) = &args.output {
         write(output, &all)?;
     }
-    report(args, &elements, &all)
+    report(args, &frames, &elements, &all)
 }
 
-/// Refuses a vertex that is not finite in a frame.
-fn refuse_invalid(path: &Path, elements: &MeshElements) -> Result<(), Failure> {
-    let Some(vertex) = elements.vertices.boxes.iter().position(|aabb| !aabb.is_valid()) else {
-        return Ok(());
+/// Returns the elements of one frame, or of two.
+fn elements(frames: &[Frame<'_>]) -> Result<MeshElements, Failure> {
+    let elements = frames[0].1.elements(frames.get(1).map(|(_, mesh)| mesh));
+    let next = frames[frames.len() - 1].0.display();
+    elements.map_err(|what| Failure::Input(format!("{next}: {what}")))
+}
+
+/// Refuses a vertex that is not a number in a frame.
+fn refuse_invalid((path, mesh): &Frame<'_>) -> Result<(), Failure> {
+    let Some((vertex, place)) = mesh.first_invalid else { return Ok(()) };
+    let line = if let Location::Line(_) = place { format!("{place}: ") } else { String::new() };
+    let (first, what) = (mesh.first_number, "has a NaN; mend it, or leave out --strict");
+    let vertex = vertex + first;
+    Err(Failure::Input(format!("{}: {line}vertex {vertex} (counted from {first}) {what}", path.display())))
+}
+
+/// Returns what the files have that a reader may not expect, a line each.
+fn notes(frames: &[Frame<'_>]) -> Vec<String> {
+    let of_file = |(path, mesh): &Frame<'_>| {
+        let line = |note| format!("{}: {note}", path.display());
+        mesh.notes().into_iter().map(line).collect::<Vec<_>>()
     };
-    let what = "has a NaN; mend it, or leave out --strict";
-    Err(Failure::Input(format!("{}: vertex {vertex} (counted from 0) {what}", path.display())))
+    frames.iter().flat_map(of_file).collect()
 }
 
 /// Checks the output before the work: `.npy` has no column for kinds.
@@ -117,7 +135,8 @@ fn write(output: &Path, all: &[Found]) -> Result<(), String> {
     write_id_pairs(output, one.pairs.iter().copied())
 }
 
-fn report(args: &Args, elements: &MeshElements, all: &[Found]) -> Result<(), Failure> {
+fn report(args: &Args, frames: &[Frame<'_>], elements: &MeshElements, all: &[Found]) -> Result<(), Failure> {
+    let (rods, notes) = (frames[0].1.rods.len(), notes(frames));
     let counts = [&elements.vertices, &elements.edges, &elements.faces].map(|all| all.boxes.len());
     let [vertices, edges, faces] = counts;
     if args.json {
@@ -133,18 +152,33 @@ fn report(args: &Args, elements: &MeshElements, all: &[Found]) -> Result<(), Fai
             })
         };
         let searches: Vec<_> = all.iter().map(object).collect();
-        let counts =
-            serde_json::json!({"vertices": vertices, "edges": edges, "faces": faces, "searches": searches});
-        return print(&counts.to_string());
+        let object = serde_json::json!({
+            "vertices": vertices,
+            "edges": edges,
+            "rods": rods,
+            "faces": faces,
+            "notes": notes,
+            "searches": searches,
+        });
+        return print(&object.to_string());
     }
     let line = |found: &Found| {
-        let (kinds, Report { pairs, invalid, .. }, ms) = (&found.kinds.0, &found.report, &found.ms);
-        format!(
-            "\n{kinds}: {pairs} candidate pairs without a common vertex ({invalid} elements invalid)\n{ms}\n{}",
-            plan_text(&found.report)
-        )
+        let (kinds, pairs, ms) = (&found.kinds.0, found.report.pairs, &found.ms);
+        let (invalid, plan) = (invalid_text(found, elements), plan_text(&found.report));
+        format!("\n{kinds}: {pairs} candidate pairs without a common vertex ({invalid})\n{ms}\n{plan}")
     };
     let lines: String = all.iter().map(line).collect();
-    let summary = format!("{vertices} vertices, {edges} edges, {faces} faces{lines}");
+    let notes: String = notes.iter().map(|note| format!("\n{note}")).collect();
+    let summary = format!("{vertices} vertices, {edges} edges ({rods} rods), {faces} faces{notes}{lines}");
     print_summary(args.output.as_deref(), &summary)
+}
+
+/// Says how many elements are invalid, and which is the first.
+fn invalid_text(found: &Found, elements: &MeshElements) -> String {
+    let (a, b) = found.kinds.of(elements);
+    let first = [Some(a), b].into_iter().flatten().zip(found.kinds.0.chars()).find_map(|(list, kind)| {
+        let element = list.boxes.iter().position(|aabb| !aabb.is_valid())?;
+        Some(format!(", the first is {kind} {element}"))
+    });
+    format!("{} elements invalid{}", found.report.invalid, first.unwrap_or_default())
 }

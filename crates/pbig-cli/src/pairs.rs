@@ -5,7 +5,10 @@ use crate::options::{
     THREADS, check_output, plan_text, print_summary, search_text, stages, whole, with_threads,
 };
 use pbig_core::{Error, Finder};
-use pbig_harness::files::{BOXES_OR_PAIRS, BoxList, Location, read_boxes, write_id_pairs, write_pairs};
+use pbig_harness::files::{
+    BOXES_OR_PAIRS, BoxList, Location, ending, read_boxes, write_id_pairs, write_pairs,
+};
+use pbig_harness::mesh::MESHES;
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use std::path::{Path, PathBuf};
@@ -76,6 +79,7 @@ fn search(args: &Args, input: &Path) -> Result<(), Failure> {
 fn read<'a>(args: &'a Args, input: &'a Path) -> Result<Vec<Named<'a>>, Failure> {
     let paths: Vec<&Path> = [Some(input), args.with.as_deref()].into_iter().flatten().collect();
     for path in &paths {
+        refuse_mesh(path)?;
         check_output(args.output.as_deref(), &BOXES_OR_PAIRS, path, args.json)?;
     }
     let lists: Vec<Named<'_>> =
@@ -84,6 +88,15 @@ fn read<'a>(args: &'a Args, input: &'a Path) -> Result<Vec<Named<'a>>, Failure> 
         lists.iter().try_for_each(|(path, list)| refuse_invalid(path, list))?;
     }
     Ok(lists)
+}
+
+/// Refuses a mesh with the options that read it.
+fn refuse_mesh(path: &Path) -> Result<(), Failure> {
+    if ending(path, &MESHES).is_err() {
+        return Ok(());
+    }
+    let path = path.display();
+    Err(Failure::Input(format!("{path}: this is a mesh; use --mesh {path} --elements ee, or vf")))
 }
 
 fn refuse_invalid(path: &Path, list: &BoxList) -> Result<(), Failure> {

@@ -6,7 +6,7 @@ mod write;
 
 pub use npy::{npy_boxes, npy_frames};
 pub use text::csv_boxes;
-pub(crate) use text::{Lines, MAX_LINE_BYTES, too_long};
+pub(crate) use text::{Lines, too_long};
 pub use write::{check_output, is_stdout, write_csv, write_id_pairs, write_pairs};
 
 use pbig_core::{Aabb, Limits};

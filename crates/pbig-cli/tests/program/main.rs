@@ -2,6 +2,7 @@
 
 mod bench;
 mod files;
+mod mesh;
 mod refused;
 mod replay;
 mod sets;

@@ -107,6 +107,8 @@ fn wrong_files_are_refused_in_little_memory() {
         (vec![], 1 << 33, &["x.npy"]),
         (vec![], 1 << 33, &["x.csv"]),
         (ply.into(), 0, &mesh),
+        (vec![], 1 << 33, &mesh),
+        (vec![], 1 << 33, &["--elements", "vv", "--mesh", "x.obj"]),
     ] {
         let name = args[args.len() - 1];
         let mut file = std::fs::File::create(folder.path().join(name)).expect("a file");

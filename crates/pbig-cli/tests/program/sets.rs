@@ -95,7 +95,10 @@ fn a_wrong_mesh_or_option_is_refused_in_one_line() {
     write(here, "less.obj", "v 0 0 0\n");
     write(here, "wrong.obj", "v 0 0 0\nf 1 2 zero\n");
     let mesh = |name: &str, more: &[&str]| pbig(here, &[&["pairs", "--mesh", name], more].concat());
-    refused(&mesh("wrong.obj", &["--elements", "ee"]), &["pbig: wrong.obj: line 2: 'zero' is no vertex"]);
+    refused(
+        &mesh("wrong.obj", &["--elements", "ee"]),
+        &["pbig: wrong.obj: line 2: 'zero' is not the number of a vertex"],
+    );
     refused(
         &mesh("mesh.obj", &["--elements", "ee", "--next", "less.obj"]),
         &["less.obj: not a frame of the same mesh"],

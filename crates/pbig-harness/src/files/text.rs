@@ -5,7 +5,7 @@ use pbig_core::Aabb;
 use std::io::{self, BufRead};
 
 /// Maximum length of a line, in bytes. Six numbers need a few hundred.
-pub(crate) const MAX_LINE_BYTES: usize = 64 << 10;
+const MAX_LINE_BYTES: usize = 64 << 10;
 
 /// The columns of a `.csv` file.
 const COLUMNS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
@@ -17,7 +17,7 @@ pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, String> {
 
 /// Reads boxes from a text. Stops at the first line that is wrong.
 pub(super) fn boxes(reader: impl BufRead, max_boxes: u64) -> Result<BoxList, String> {
-    let mut lines = Lines::new(reader, "6 numbers");
+    let mut lines = Lines::new(reader, MAX_LINE_BYTES, "6 numbers");
     let (mut list, mut is_first) = (BoxList::default(), true);
     while lines.advance()? {
         let about = |what| format!("line {}: {what}", lines.number);
@@ -40,13 +40,15 @@ fn check_count(boxes: usize, limit: u64) -> Result<(), String> {
     if boxes as u64 > limit { Err(too_many(boxes, limit)) } else { Ok(()) }
 }
 
-pub(crate) fn too_long(expected: &str) -> String {
-    format!("longer than {MAX_LINE_BYTES} bytes; expected {expected}")
+pub(crate) fn too_long(longest: usize, expected: &str) -> String {
+    format!("longer than {longest} bytes; expected {expected}")
 }
 
 /// Lines of bounded length, which end with `\n`, `\r\n` or `\r`.
 pub(crate) struct Lines<R> {
     reader: R,
+    /// Maximum length of a line, in bytes.
+    longest: usize,
     /// What a line should have, for an error.
     expected: &'static str,
     /// The present line, without its end.
@@ -55,11 +57,23 @@ pub(crate) struct Lines<R> {
     pub(crate) number: usize,
     /// The byte that ended the present line, or 0.
     ended_by: u8,
+    /// True if an earlier line ended with `\r` alone.
+    has_lone_cr: bool,
 }
 
 impl<R: BufRead> Lines<R> {
-    pub(crate) fn new(reader: R, expected: &'static str) -> Self {
-        Self { reader, expected, bytes: Vec::new(), number: 0, ended_by: 0 }
+    pub(crate) fn new(reader: R, longest: usize, expected: &'static str) -> Self {
+        Self { reader, longest, expected, bytes: Vec::new(), number: 0, ended_by: 0, has_lone_cr: false }
+    }
+
+    /// Returns the reader behind the present line. A `\n` after a `\r` belongs to the line, unless other lines end with `\r` alone:
+    /// then it is the first byte of what follows.
+    pub(crate) fn into_rest(mut self) -> io::Result<R> {
+        let is_half = self.ended_by == b'\r' && !self.has_lone_cr;
+        if is_half && self.reader.fill_buf()?.starts_with(b"\n") {
+            self.reader.consume(1);
+        }
+        Ok(self.reader)
     }
 
     /// Moves to the next line. Returns false at the end of the text.
@@ -72,9 +86,10 @@ impl<R: BufRead> Lines<R> {
         if self.bytes.is_empty() && (before, self.ended_by) == (b'\r', b'\n') {
             return self.advance();
         }
+        self.has_lone_cr |= before == b'\r';
         self.number += 1;
-        match self.bytes.len() > MAX_LINE_BYTES {
-            true => Err(format!("line {}: {}", self.number, too_long(self.expected))),
+        match self.bytes.len() > self.longest {
+            true => Err(format!("line {}: {}", self.number, too_long(self.longest, self.expected))),
             false => Ok(true),
         }
     }
@@ -84,13 +99,13 @@ impl<R: BufRead> Lines<R> {
         self.bytes.clear();
         loop {
             let chunk = self.reader.fill_buf()?;
-            let chunk = &chunk[..chunk.len().min(MAX_LINE_BYTES + 1)];
+            let chunk = &chunk[..chunk.len().min(self.longest + 1)];
             let end = chunk.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
             let length = end.unwrap_or(chunk.len());
             self.bytes.extend_from_slice(&chunk[..length]);
             self.ended_by = end.map_or(0, |end| chunk[end]);
             self.reader.consume(length + usize::from(end.is_some()));
-            if end.is_some() || self.bytes.len() > MAX_LINE_BYTES {
+            if end.is_some() || self.bytes.len() > self.longest {
                 return Ok(true);
             }
             if length == 0 {

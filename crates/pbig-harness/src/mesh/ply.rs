@@ -1,115 +1,141 @@
-//! Stanford's `.ply`, as text and binary, by the crate `ply-rs-bw`.
+//! Stanford's `.ply`, as text and binary: vertices, faces, strips of triangles and rods. The names of all else are kept.
+//!
+//! The crate `ply-rs-bw` refuses text such as `nan` or `.5`, and its errors are dumps. `serde-ply` takes the values of a row that
+//! has too few from the next one. Neither says in which row of a binary file something is wrong.
 
-use super::{Mesh, face};
-use pbig_core::Keys;
-use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType};
+mod body;
+mod header;
+
+use super::Mesh;
+use super::reading::MAX_LINE_BYTES;
+use crate::files::{Lines, brief, one_line};
+use body::Body;
+use header::{Element, Format};
+use pbig_core::NO_KEY;
 use std::io::BufRead;
 
+/// The names of the vertices of a face or strip, and of a rod.
+const CORNERS: [&str; 3] = ["vertex_indices", "vertex_index", "vertex_indexes"];
+const ENDS: [&str; 2] = ["vertex1", "vertex2"];
+
 pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
-    let (mut reader, mut mesh) = (Reader::new(reader), Mesh::default());
-    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(text)?;
-    // Rows without properties take no bytes: a short file could have any number of them.
-    let is_empty = |element: &&ElementDef| element.properties.is_empty() && element.count > 0;
-    if let Some(ElementDef { name, .. }) = header.elements.values().find(is_empty) {
-        return Err(format!("element `{name}` has no property"));
-    }
-    let vertex = header.elements.get("vertex").ok_or("no element `vertex`")?;
-    for axis in AXES {
-        let data_type = vertex.properties.get(axis).map(|property| &property.data_type);
-        if !matches!(data_type, Some(PropertyType::Scalar(_))) {
-            return Err(format!("element `vertex` has no number `{axis}`"));
-        }
-    }
-    for (name, element) in &header.elements {
-        match name.as_str() {
-            "vertex" => {
-                mesh.vertices = rows(&mut reader, element, &header)?.iter().map(|Point(at)| *at).collect()
-            }
-            "face" => mesh.faces = faces(&rows(&mut reader, element, &header)?)?,
-            _ => drop(rows::<Skipped>(&mut reader, element, &header)?),
-        }
-    }
-    Ok(mesh)
-}
-
-fn rows<R: PropertyAccess>(
-    reader: &mut Reader<impl BufRead>,
-    element: &ElementDef,
-    header: &Header,
-) -> Result<Vec<R>, String> {
-    let rows = Parser::new().read_payload_for_element(reader, element, header);
-    rows.map_err(|error| format!("element `{}`: {}", element.name, text(error)))
-}
-
-fn text(error: ParseError) -> String {
-    error.to_string()
-}
-
-fn faces(rows: &[Corners]) -> Result<Vec<Keys>, String> {
-    let at = |i: usize, what: &str| format!("face {i} (counted from 0): {what}");
-    let row = |(i, Corners(corners)): (usize, &Corners)| {
-        let corners = corners.as_ref().ok_or_else(|| at(i, "a vertex is no index"))?;
-        face(corners).map_err(|what| at(i, &what))
+    let mut lines = Lines::new(reader, MAX_LINE_BYTES, "a line of a header, or the values of a row");
+    let header = header::read(&mut lines)?;
+    let body = match header.format {
+        Format::Text => Body::Text { lines, at: 0 },
+        Format::Binary { is_big } => Body::Binary { reader: lines.into_rest().map_err(one_line)?, is_big },
     };
-    rows.iter().enumerate().map(row).collect()
+    let vertices = header.elements.iter().find(|element| element.name.eq_ignore_ascii_case("vertex"));
+    let vertices = vertices.ok_or("no element vertex in the header")?.rows;
+    let mut rows = Rows { body, mesh: Mesh::default(), vertices };
+    header.elements.iter().filter(|element| element.rows > 0).try_for_each(|element| rows.add(element))?;
+    rows.mesh.skip(&rows.body.rest()?, "");
+    Ok(rows.mesh)
 }
 
-/// A row of no interest.
-struct Skipped;
-
-impl PropertyAccess for Skipped {
-    fn new() -> Self {
-        Self
-    }
+/// The rows behind a header, and the mesh of those that are read.
+struct Rows<R> {
+    body: Body<R>,
+    mesh: Mesh,
+    /// Number of vertices, from the header.
+    vertices: u64,
 }
 
-/// The names of a vertex's coordinates.
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// The place of a vertex.
-struct Point([f64; 3]);
-
-impl PropertyAccess for Point {
-    fn new() -> Self {
-        Self([f64::NAN; 3])
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let axis = AXES.iter().position(|axis| *axis == name);
-        let Some((axis, value)) = axis.zip(scalar(&property)) else { return PropertyAccessResult::Ignored };
-        self.0[axis] = value;
-        PropertyAccessResult::Set
-    }
-}
-
-fn scalar(property: &Property) -> Option<f64> {
-    Some(match *property {
-        Property::Float(x) => x.into(),
-        Property::Double(x) => x,
-        Property::Char(x) => x.into(),
-        Property::UChar(x) => x.into(),
-        Property::Short(x) => x.into(),
-        Property::UShort(x) => x.into(),
-        Property::Int(x) => x.into(),
-        Property::UInt(x) => x.into(),
-        _ => return None,
-    })
-}
-
-/// The vertices of a face; none if one of them is negative or no integer, or the file does not have them.
-struct Corners(Option<Vec<u32>>);
-
-impl PropertyAccess for Corners {
-    fn new() -> Self {
-        Self(None)
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        if !["vertex_indices", "vertex_index"].contains(&name) {
-            return PropertyAccessResult::Ignored;
+impl<R: BufRead> Rows<R> {
+    fn add(&mut self, element: &Element) -> Result<(), String> {
+        match element.name.to_ascii_lowercase().as_str() {
+            "vertex" => self.add_vertices(element),
+            "face" => self.add_faces(element),
+            "tristrips" if element.column(&CORNERS, true).is_ok() => self.add_strips(element),
+            "edge" if element.column(&ENDS[..1], false).is_ok() => self.add_rods(element),
+            _ => self.skip(element),
         }
-        self.0 = property.to_u32_list();
-        PropertyAccessResult::Set
     }
+
+    fn skip(&mut self, element: &Element) -> Result<(), String> {
+        self.mesh.skip(&[format!("element {} ({})", element.name, element.rows)], "");
+        // Rows without properties take no bytes: a short file could have any number of them.
+        let rows = if element.properties.is_empty() { 0 } else { element.rows };
+        (0..rows).try_for_each(|row| self.body.row(element, row, &[], |_, _| Ok(())).map(|_| ()))
+    }
+
+    fn add_vertices(&mut self, element: &Element) -> Result<(), String> {
+        let axis = |name| element.column(&[name], false);
+        let columns = [axis("x")?, axis("y")?, axis("z")?];
+        self.mesh.skip(&element.names_without(&columns), " of element vertex");
+        for row in 0..element.rows {
+            let mut at = [0.0; 3];
+            let place = self.body.row(element, row, &columns, |axis, value| {
+                at[axis] = value;
+                Ok(())
+            })?;
+            self.mesh.add_vertex(at, place);
+        }
+        Ok(())
+    }
+
+    fn add_faces(&mut self, element: &Element) -> Result<(), String> {
+        let column = [element.column(&CORNERS, true)?];
+        self.mesh.skip(&element.names_without(&column), " of element face");
+        let (mut corners, vertices) = (Vec::new(), self.vertices);
+        for row in 0..element.rows {
+            corners.clear();
+            let place = self.body.row(element, row, &column, |_, value| {
+                // A fifth one is refused below; a list can have billions.
+                if corners.len() < 5 {
+                    corners.push(index(value, vertices)?);
+                }
+                Ok(())
+            })?;
+            self.mesh.add_face(&corners, place).map_err(|what| element.at(place, &what))?;
+        }
+        Ok(())
+    }
+
+    /// Adds a triangle for each three vertices in a row. After -1 a new strip begins; a triangle that names a vertex twice only
+    /// leads from one strip to the next.
+    fn add_strips(&mut self, element: &Element) -> Result<(), String> {
+        let column = [element.column(&CORNERS, true)?];
+        self.mesh.skip(&element.names_without(&column), " of element tristrips");
+        let (faces, vertices) = (&mut self.mesh.faces, self.vertices);
+        for row in 0..element.rows {
+            let mut strip = [NO_KEY; 3];
+            self.body.row(element, row, &column, |_, value| {
+                let is_end = value == -1.0 || value == f64::from(u32::MAX);
+                strip = if is_end { [NO_KEY; 3] } else { [strip[1], strip[2], index(value, vertices)?] };
+                let [a, b, c] = strip;
+                if a != NO_KEY && a != b && b != c && c != a {
+                    faces.push([a, b, c, NO_KEY]);
+                }
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
+    fn add_rods(&mut self, element: &Element) -> Result<(), String> {
+        let columns = [element.column(&ENDS[..1], false)?, element.column(&ENDS[1..], false)?];
+        self.mesh.skip(&element.names_without(&columns), " of element edge");
+        let (mut ends, vertices) = ([0; 2], self.vertices);
+        for row in 0..element.rows {
+            let place = self.body.row(element, row, &columns, |end, value| {
+                ends[end] = index(value, vertices)?;
+                Ok(())
+            })?;
+            self.mesh.add_rod(ends, place);
+        }
+        Ok(())
+    }
+}
+
+/// Returns a vertex that exists.
+fn index(value: f64, vertices: u64) -> Result<u32, String> {
+    let text = || brief(&value.to_string());
+    if value.fract() != 0.0 {
+        return Err(format!("'{}' is not the number of a vertex", text()));
+    }
+    // Exact: no file has as many vertices as an f64 cannot count.
+    let exists = value >= 0.0 && value < vertices as f64 && value < f64::from(NO_KEY);
+    let what = || format!("vertex {} does not exist; the file has {vertices}, counted from 0", text());
+    exists.then_some(value as u32).ok_or_else(what)
 }

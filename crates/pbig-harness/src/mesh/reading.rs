@@ -1,0 +1,139 @@
+//! Meshes from files: what both formats have in common.
+
+use super::{MESHES, Mesh, obj, ply};
+use crate::files::{Location, brief, ending, one_line};
+use pbig_core::NO_KEY;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// Maximum length of a line, in bytes. A strip of triangles may have millions of vertices.
+pub(super) const MAX_LINE_BYTES: usize = 64 << 20;
+
+/// Number of names that a list of skipped things shows.
+const MOST_NAMES: usize = 8;
+
+impl Mesh {
+    /// Reads a `.ply` or `.obj` file.
+    ///
+    /// # Errors
+    /// The file, what is wrong and where, in one line.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let read = if ending(path, &MESHES)? == "ply" { Self::from_ply } else { Self::from_obj };
+        let file = std::fs::File::open(path).map_err(|error| error.to_string());
+        file.and_then(|file| read(BufReader::new(file))).map_err(|what| format!("{}: {what}", path.display()))
+    }
+
+    /// Reads the content of a `.ply` file.
+    ///
+    /// # Errors
+    /// The fault and its place, in one line.
+    pub fn from_ply(mut content: impl BufRead) -> Result<Self, String> {
+        refuse_other_bytes(&mut content).and_then(|()| ply::read(content)).map_err(one_line)
+    }
+
+    /// Reads the content of an `.obj` file.
+    ///
+    /// # Errors
+    /// The fault and its place, in one line.
+    pub fn from_obj(mut content: impl BufRead) -> Result<Self, String> {
+        refuse_other_bytes(&mut content).and_then(|()| obj::read(content)).map_err(one_line)
+    }
+
+    /// Returns what a reader of the summary should know about the file, a line each.
+    pub fn notes(&self) -> Vec<String> {
+        let invalid = self.first_invalid.map(|(vertex, place)| {
+            let all = self.vertices.iter().filter(|at| at.iter().any(|x| x.is_nan())).count();
+            let number = vertex + self.first_number;
+            format!("vertices with a NaN: {all}, the first is vertex {number} in {place}")
+        });
+        let twice = |what: &str, seen: Option<(usize, Location)>| {
+            seen.map(|(all, place)| format!("{what}: {all}, the first in {place}"))
+        };
+        let doubled = twice("faces that name a vertex twice", self.doubled);
+        let dropped = twice("rods from a vertex to itself, left out", self.dropped);
+        let empty = match (self.faces.is_empty(), self.rods.is_empty()) {
+            (true, true) => Some("no faces and no rods".to_owned()),
+            (true, false) => Some("no faces; rods have edges and vertices".to_owned()),
+            _ => None,
+        };
+        let skipped = (!self.skipped.is_empty()).then(|| format!("not read: {}", self.skipped.join("; ")));
+        [invalid, doubled, dropped, empty, skipped].into_iter().flatten().collect()
+    }
+
+    pub(super) fn add_vertex(&mut self, at: [f64; 3], place: Location) {
+        if self.first_invalid.is_none() && at.iter().any(|x| x.is_nan()) {
+            self.first_invalid = Some((self.vertices.len(), place));
+        }
+        self.vertices.push(at);
+    }
+
+    /// Adds a face of three or four vertices.
+    pub(super) fn add_face(&mut self, corners: &[u32], place: Location) -> Result<(), String> {
+        let face = match *corners {
+            [a, b, c] => [a, b, c, NO_KEY],
+            [a, b, c, d] => [a, b, c, d],
+            _ if corners.len() < 3 => {
+                return Err(format!("expected a face of 3 or 4 vertices, found {}", corners.len()));
+            }
+            _ => {
+                return Err(
+                    "a face of more than 4 vertices; divide it into triangles or quadrilaterals".into()
+                );
+            }
+        };
+        if corners.iter().enumerate().any(|(i, corner)| corners[..i].contains(corner)) {
+            count(&mut self.doubled, place);
+        }
+        self.faces.push(face);
+        Ok(())
+    }
+
+    pub(super) fn add_rod(&mut self, ends: [u32; 2], place: Location) {
+        match ends[0] == ends[1] {
+            true => count(&mut self.dropped, place),
+            false => self.rods.push(ends),
+        }
+    }
+
+    /// Adds names of what is skipped. Those of one `group`, such as the properties of an element, are one entry.
+    pub(super) fn skip(&mut self, names: &[String], group: &str) {
+        if !names.is_empty() {
+            self.skipped.push(format!("{}{group}", list(names)));
+        }
+    }
+}
+
+fn count(seen: &mut Option<(usize, Location)>, place: Location) {
+    let (all, first) = seen.unwrap_or((0, place));
+    *seen = Some((all + 1, first));
+}
+
+/// Returns the first names, and how many there are more.
+fn list(names: &[String]) -> String {
+    let (shown, rest) = names.split_at(names.len().min(MOST_NAMES));
+    let more = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
+    let plain = |name: &String| name.chars().map(|c| if c.is_control() { '?' } else { c }).collect();
+    format!("{}{more}", shown.iter().map(plain).collect::<Vec<String>>().join(", "))
+}
+
+/// Refuses other bytes than a text has at its beginning, or a header, with what to do about them.
+fn refuse_other_bytes(content: &mut impl BufRead) -> Result<(), String> {
+    let begun = content.fill_buf().map_err(one_line)?;
+    let has = |starts: &[&[u8]]| starts.iter().any(|start| begun.starts_with(start));
+    if begun.is_empty() {
+        return Err("the file is empty".into());
+    }
+    if has(&[b"\xff\xfe", b"\xfe\xff"]) {
+        return Err("this is UTF-16; save the file as UTF-8 text".into());
+    }
+    match has(&[b"\x1f\x8b", b"PK\x03\x04", b"\x28\xb5\x2f\xfd"]) {
+        true => Err("this is compressed; unpack it first".into()),
+        false => Ok(()),
+    }
+}
+
+/// Returns a number, also with Fortran's `d` before the exponent.
+pub(super) fn number(word: &str) -> Result<f64, String> {
+    let number = word.parse().or_else(|_| word.replace(['d', 'D'], "e").parse());
+    number.map_err(|_| format!("'{}' is not a number such as -0.5, 1e3 or nan", brief(word)))
+}
