@@ -1,4 +1,4 @@
-// Types that kernels share. pbig-core's layout.rs has the same structs, field by field.
+// Types that kernels share. pbig-gpu's layout.rs has the same structs, field by field.
 
 // Lanes of a workgroup, and boxes of a segment (PBIG 5.2).
 const LANES = 256u;

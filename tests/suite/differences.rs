@@ -218,7 +218,11 @@ fn an_index_takes_72_bytes() {
     colliders[two[0]].set_active_collision_types(ActiveCollisionTypes::all());
     let (mut ours, before) = (PbigBroadPhase::new(), held());
     let (params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
-    ours.update(&params, &colliders, &bodies, &two, &[], &mut Vec::new());
-    let each = (held() - before) as f64 / far as f64;
-    assert!(ours.pair_count() == 1 && (72.0..72.5).contains(&each), "{each} bytes");
+    for (x, pairs) in [(0.0, 1), (0.5, 1), (9.0, 0)] {
+        colliders[two[0]].set_translation(vector![x, 0.0, 0.0]);
+        ours.update(&params, &colliders, &bodies, &two, &[], &mut Vec::new());
+        let each = (held() - before) as f64 / far as f64;
+        println!("{each}");
+        assert!(ours.pair_count() == pairs && (72.0..72.5).contains(&each), "{each} bytes at {x}");
+    }
 }

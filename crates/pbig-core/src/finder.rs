@@ -66,8 +66,8 @@ impl Finder {
         Self { config, ..Self::default() }
     }
 
-    /// Makes a finder with a given device. [`crate::Backend::Device`] always uses it, [`crate::Backend::Auto`] if it is hardware and
-    /// the boxes are many.
+    /// Makes a finder with a given device, which lists the pairs of one set without keys. [`crate::Backend::Device`] uses it for
+    /// each such list, [`crate::Backend::Auto`] if it is hardware and the boxes are many.
     pub fn with_device(config: Config, device: Box<dyn PairDevice>) -> Self {
         Self { device: DeviceSlot::new(device), ..Self::new(config) }
     }
