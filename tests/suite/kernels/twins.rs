@@ -128,7 +128,7 @@ pub(super) fn finest_cell(params: &Params, key: i32) -> i32 {
     const REACH: f64 = 1073741824.0;
     let ticks = (f64::from(float_of(key)) * 2f64.powi(150 - params.tick_exponent)).floor();
     let above = ticks.clamp(-REACH, REACH - 1.0) + REACH;
-    (above as u64 * u64::from(params.cells_per_tick) >> 16) as i32
+    ((above as u64 * u64::from(params.cells_per_tick)) >> 16) as i32
 }
 
 /// Returns the first level at which the box touches few cells on each axis, or the last level.
