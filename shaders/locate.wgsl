@@ -13,13 +13,28 @@ const VALID = 4u;
 
 var<workgroup> valid: atomic<u32>;
 
-// Returns the cell of a coordinate. Each step is monotone in `key`: clamp, subtraction, multiplication by a positive
-// number, rounding.
-fn finest_cell(key: i32, axis: u32) -> i32 {
-    let x = float_of(clamp(key, params.clamp_low[axis], params.clamp_high[axis]));
-    let cell = floor((x - params.origin[axis]) * params.scale);
-    // The limit is just inside 2^30: the distance of two cells must fit an i32.
-    return i32(clamp(cell, -1073741760.0, 1073741760.0));
+// Coordinates in ticks lie less than this far from zero; those beyond are at the ends.
+const REACH = 0x40000000;
+
+// Returns a coordinate in ticks, rounded down. The shifts are exact: two places that read a coordinate get the same tick,
+// whatever the compiler does to floats.
+fn ticks(key: i32) -> i32 {
+    let bits = key ^ ((key >> 31u) & 0x7fffffff);
+    let exponent = (bits >> 23u) & 0xff;
+    let magnitude = (bits & 0x7fffff) | select(0x800000, 0, exponent == 0);
+    let signed = select(magnitude, -magnitude, key < 0);
+    let shift = max(exponent, 1) - params.tick_exponent;
+    // Seven places move a float of any larger exponent beyond the reach.
+    let up = signed << u32(clamp(shift, 0, 7));
+    let down = signed >> u32(clamp(-shift, 0, 31));
+    return clamp(select(down, up, shift > 0), -REACH, REACH - 1);
+}
+
+// Returns the cell of a coordinate at the finest resolution: monotone, and never negative.
+fn finest_cell(key: i32) -> i32 {
+    let above = u32(ticks(key) + REACH);
+    let scale = params.cells_per_tick;
+    return i32((above >> 16u) * scale + (((above & 0xffffu) * scale) >> 16u));
 }
 
 // Returns the first level at which the box touches at most MAX_SPAN cells along each axis. The last level has one cell.
@@ -67,8 +82,8 @@ fn locate_one(id: u32) {
     var low: vec3<i32>;
     var high: vec3<i32>;
     for (var axis = 0u; axis < 3u; axis++) {
-        low[axis] = finest_cell(one.low[axis], axis);
-        high[axis] = finest_cell(one.high[axis], axis);
+        low[axis] = finest_cell(one.low[axis]);
+        high[axis] = finest_cell(one.high[axis]);
     }
     let level = level_of(low, high);
     var at = located_at(low, high, level);

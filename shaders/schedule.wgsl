@@ -45,10 +45,18 @@ fn pairs_of(cell: Cell) -> u32 {
     return cell.residents * (2u * n - cell.residents - 1u) / 2u;
 }
 
+// Maximum number that `large_tests` returns, less one.
+const MOST_TESTS = 1u << 30u;
+
 // Returns about as many tests as a large cell needs, in units of LANES.
 fn large_tests(cell: Cell) -> u32 {
-    let n = f32(cell.residents) * f32(cell.residents + 2u * cell.visitors) / f32(2u * LANES);
-    return u32(min(n, 1073741824.0)) + 1u;
+    let partners = cell.residents + 2u * cell.visitors;
+    let whole = partners / (2u * LANES);
+    if whole > MOST_TESTS / cell.residents {
+        return MOST_TESTS + 1u;
+    }
+    let rest = cell.residents * (partners % (2u * LANES)) / (2u * LANES);
+    return min(cell.residents * whole + rest, MOST_TESTS) + 1u;
 }
 
 // Adds to the number of tests, by one lane.

@@ -1,8 +1,5 @@
 // Cells at a level, computed from those at the finest resolution, in integers only (contract 3).
 
-// Offset that makes every cell positive. All cells have the same, so distances do not change.
-const OFFSET = 0x40000000;
-
 // Cells of a box at a level: the lowest on each axis, wrapped around, and their number on each axis.
 struct Touched {
     wrapped: vec3<u32>,
@@ -17,7 +14,7 @@ fn touched(at: Located, level: u32) -> Touched {
     let steps = (vec3<u32>(at.shape) >> vec3<u32>(SPAN_BITS, SPAN_BITS + 2u, SPAN_BITS + 4u)) & vec3<u32>(3u);
     let first = low >> vec3<u32>(shift);
     let span = vec3<u32>(((low + vec3<i32>(steps)) >> vec3<u32>(shift)) - first) + 1u;
-    let wrapped = vec3<u32>(first + OFFSET) % dims;
+    let wrapped = vec3<u32>(first) % dims;
     return Touched(select(vec3<u32>(0u), wrapped, divided), select(vec3<u32>(1u), span, divided));
 }
 

@@ -4,11 +4,6 @@
 const LOWEST = -0x7f800001;
 const HIGHEST = 0x7f800000;
 
-// Returns the float of an ordered integer.
-fn float_of(key: i32) -> f32 {
-    return bitcast<f32>(key ^ ((key >> 31u) & 0x7fffffff));
-}
-
 // Returns the ordered integer of a float's bits. Both zeros become one.
 fn ordered(bits: i32) -> i32 {
     return select(bits ^ ((bits >> 31u) & 0x7fffffff), 0, bits == -0x7fffffff - 1);

@@ -1,4 +1,4 @@
-// Types that kernels share. pbig-core's layout.rs has the same structs, field by field.
+// Types that kernels share. pbig-gpu's layout.rs has the same structs, field by field.
 
 // Lanes of a workgroup, and boxes of a segment (PBIG 5.2).
 const LANES = 256u;
@@ -75,14 +75,12 @@ struct Level {
 }
 
 struct Params {
-    // Lower corner of cell 0, and cells per unit of length at the finest resolution.
-    origin: vec3<f32>,
-    scale: f32,
-    // Coordinates are clamped to these bounds before they become cells.
-    clamp_low: vec3<i32>,
     boxes: u32,
-    clamp_high: vec3<i32>,
     levels: u32,
+    // Exponent, as in the bits of a float, of the floats whose last bit is a tick.
+    tick_exponent: i32,
+    // Cells at the finest resolution in 2^16 ticks, at most 2^16.
+    cells_per_tick: u32,
     cells: u32,
     small_cell: u32,
     // Number of column segments of a large work item.

@@ -102,12 +102,18 @@ fn a_few_invalid_and_far_boxes_among_many() {
 fn a_finder_used_for_one_set_and_two_mixes_nothing_up() {
     let [a, b] = [1, 2].map(|seed| set("unit", 3000, seed));
     let mut finder = Finder::default();
-    for _ in 0..2 {
-        let across = finder.find_between(&a, &b).expect("within the limits").to_vec();
-        assert!(finder.pairs().is_empty() && across == oracle::pairs_between(&a, &b));
-        assert!(finder.find(&a).expect("within the limits") == oracle::pairs(&a));
-        assert!(finder.pairs_between().is_empty());
+    for set in [&a, &b] {
+        assert!(finder.find(set).expect("within the limits") == oracle::pairs(set));
+        assert!(finder.find_between(set, &b).expect("within the limits") == oracle::pairs_between(set, &b));
+        finder.for_each_pair_between(&b, &a, |_| ()).expect("within the limits");
+        finder.for_each_pair(&a[..9], |_| ()).expect("within the limits");
+        // Each list is that of the last call that makes one of its kind.
+        assert!(finder.pairs() == oracle::pairs(set));
+        assert!(finder.pairs_between() == oracle::pairs_between(set, &b));
     }
+    assert!(finder.find_between(&a, Boxes::new(&b).with_filters(&[])).is_err());
+    assert!(finder.pairs_between().is_empty() && !finder.pairs().is_empty());
+    assert!(finder.find_filtered(&a, &[]).is_err() && finder.pairs().is_empty());
 }
 
 #[test]

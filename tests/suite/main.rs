@@ -5,6 +5,7 @@ mod bounded;
 mod calls;
 mod changes;
 mod checked;
+mod differences;
 mod documents;
 mod drop_in;
 mod edits;

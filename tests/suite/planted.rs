@@ -1,6 +1,6 @@
 //! Each checker notices the faults it is for: a dropped, a doubled, a swapped and a spurious pair.
 
-use pbig_core::{Aabb, Pair, oracle};
+use pbig_core::{Aabb, Pair, ProxyFilter, oracle};
 use pbig_harness::runner::{Run, Timed};
 use pbig_harness::scenes::Scene;
 use pbig_tests::{difference, set};
@@ -107,4 +107,7 @@ fn the_shadow_checker_notices_a_collider_paired_with_itself() {
 fn the_oracle_itself_is_checked_by_hand() {
     let boxes = [[0.0, 1.0], [1.0, 2.0], [2.5, 3.0]].map(|[low, high]| Aabb::new([low; 3], [high; 3]));
     assert_eq!(oracle::pairs(&boxes), [Pair::new(0, 1)]);
+    let filters = |count| vec![ProxyFilter::ALL; count];
+    assert_eq!(oracle::pairs_filtered(&boxes, &filters(2)), [Pair::new(0, 1)]);
+    assert_eq!(oracle::pairs_filtered(&boxes, &filters(1)), [], "a box without a filter pairs with nothing");
 }

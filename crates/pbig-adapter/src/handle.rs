@@ -7,7 +7,7 @@ use std::fmt;
 pub struct Handle {
     /// The place in rapier's set.
     pub index: u32,
-    /// The number of earlier uses of the place.
+    /// A number that tells apart the objects that had the place, one after the other.
     pub generation: u32,
 }
 

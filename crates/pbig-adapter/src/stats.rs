@@ -4,7 +4,8 @@ use crate::{Colliders, Tree};
 use pbig_core::Report;
 
 /// Counts of the last update. Rapier 0.27 makes two updates in each step: the first sees what the app changed, the second what
-/// the step moved. After a step these are the numbers of the second one; [`Totals`] adds up both. Rapier 0.36 makes one.
+/// the step moved. After a step these are the numbers of the second one; [`Totals`] adds up both. Rapier 0.36 makes one. Both make
+/// one more for each further substep of continuous collision detection.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Stats<'a> {

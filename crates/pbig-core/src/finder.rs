@@ -67,8 +67,8 @@ impl Finder {
         Self { config, ..Self::default() }
     }
 
-    /// Makes a finder with a given device. [`crate::Backend::Device`] always uses it, [`crate::Backend::Auto`] if it is hardware and
-    /// the boxes are many.
+    /// Makes a finder with a given device, which lists the pairs of one set without keys. [`crate::Backend::Device`] uses it for
+    /// each such list, [`crate::Backend::Auto`] if it is hardware and the boxes are many.
     pub fn with_device(config: Config, device: Box<dyn PairDevice>) -> Self {
         Self { device: DeviceSlot::new(device), ..Self::new(config) }
     }
@@ -114,6 +114,7 @@ impl Finder {
     }
 
     fn list(&mut self, all: Boxes<'_>) -> Result<&[Pair], Error> {
+        self.pairs.clear();
         self.begin(&[all])?;
         let is_sorted = self.config.order == Order::Sorted;
         let grouping = is_sorted.then(|| Grouping::new(all.boxes.len()));
@@ -130,9 +131,9 @@ impl Finder {
         Ok(&self.pairs)
     }
 
-    /// Begins a search: forgets the last one, and checks the boxes.
+    /// Begins the report on a search, and checks the boxes.
     fn begin(&mut self, sets: &[Boxes<'_>]) -> Result<(), Error> {
-        self.forget();
+        self.report = Report::default();
         sets.iter().try_for_each(Boxes::check)?;
         let boxes = sets.iter().map(|set| set.boxes.len() as u64).sum();
         check_count(boxes, &self.config.limits)?;
@@ -199,13 +200,6 @@ impl Finder {
             self.all_pairs.list(&mut self.pairs);
         }
         self.report.stages.emit = clock.lap();
-    }
-
-    /// Forgets the last call, so that no result of it remains if the next one fails.
-    fn forget(&mut self) {
-        self.pairs.clear();
-        self.pairs_between.clear();
-        self.report = Report::default();
     }
 
     /// Returns the pairs of the last call that lists pairs of one set; none if it failed.

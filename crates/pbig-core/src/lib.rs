@@ -10,6 +10,7 @@
 //! | a mesh, and no pairs of neighbours | [`Finder::find_without_shared`] |
 //! | more pairs than a list should hold | [`Finder::for_each_pair`] |
 //! | boxes that move a little, come and go | [`BroadPhase`], which tells what changed |
+//! | rays, moving boxes or points that meet boxes | [`BoxIndex`] |
 //!
 //! ```
 //! use pbig_core::{find_pairs, Aabb, Pair};
@@ -27,15 +28,15 @@
 //!
 //! For rapier worlds use the crate `rapier-pbig`, which feeds colliders to this one. Use this crate
 //! for boxes of your own: from ten to a hundred million, of any mix of sizes, anywhere in f32. It
-//! knows boxes only: no rays, no shapes.
+//! knows no shapes.
 //!
 //! Another processor, such as the GPU of the crate `pbig-gpu`, finds pairs behind the trait [`PairDevice`].
 //!
 //! # What is guaranteed
 //!
 //! * Two valid boxes pair when `a.min <= b.max && b.min <= a.max` on all three axes, in f32, exactly, as
-//!   [`oracle`] defines it. The pairs and their order are the same for every backend and thread count.
-//!   The threads are the calling one and those of its rayon pool.
+//!   [`oracle`] defines it. The pairs are the same for every backend and thread count, and so is their order unless
+//!   [`Order::Unspecified`] is asked for. The threads are the calling one and those of its rayon pool.
 //! * A call is complete or an [`Error`]; there are no partial results.
 //! * A box with a NaN, or with `min > max`, is invalid: it pairs with nothing and harms no other box.
 //!   ([`Aabb::overlaps`] compares corners only, and is true for some inverted boxes.)

@@ -80,7 +80,7 @@ shared_structs! {
     Level { dims: [u32; 3], shift: u32, first_cell: u32, unused: [u32; 3] }
     /// Parameters of all kernels of a call.
     Params {
-        origin: [f32; 3], scale: f32, clamp_low: [i32; 3], boxes: u32, clamp_high: [i32; 3], levels: u32,
+        boxes: u32, levels: u32, tick_exponent: i32, cells_per_tick: u32,
         cells: u32, small_cell: u32, columns: u32, flags: u32, split: u32,
         entry_capacity: u32, slot_capacity: u32, small_capacity: u32, large_capacity: u32,
         known: u32, box_changes: u32, filter_changes: u32, pair_capacity: u32,

@@ -25,9 +25,8 @@
 //! assert!((bodies[ball].translation().y - 0.5).abs() < 0.01, "the ball rests on the ground");
 //! ```
 //!
-//! It reports the pairs that rapier's own broad phase reports, except those that rapier's narrow phase would discard: colliders
-//! of one body, types of bodies that do not collide, and groups that exclude each other. The order of events depends on the
-//! scene alone.
+//! It reports every pair of colliders whose AABBs overlap, except those that rapier's narrow phase would discard: colliders of one
+//! body, types of bodies that do not collide, and groups that exclude each other. The order of events depends on the scene alone.
 //!
 //! | feature | adds |
 //! | --- | --- |

@@ -30,8 +30,8 @@
 //!
 //! A broad phase that exists already, such as that of `bevy_rapier3d`, is changed by [`install`].
 //!
-//! It reports the pairs of colliders whose AABBs, with rapier's margin, overlap, and that rapier's filters admit. The order of
-//! events depends on the scene alone, not on the number of threads.
+//! It reports the pairs of colliders whose stored AABBs, larger by rapier's margin, overlap, and that rapier's filters admit. The
+//! order of events depends on the scene alone, not on the number of threads.
 //!
 //! The crates `rapier2d-pbig`, `rapier2d-f64-pbig`, `rapier3d-pbig` and `rapier3d-f64-pbig` are this source for the four crates of
 //! rapier. In f64 the pairs are those of boxes in f64, at any distance from the origin.
@@ -91,7 +91,7 @@ pub fn install(broad_phase: &mut BroadPhaseBvh) {
     }
 }
 
-/// As [`install`], with settings.
+/// As [`install`], with settings. It also replaces a pbig that is installed already; no contact is lost.
 ///
 /// # Errors
 /// [`Error::Margin`].
@@ -100,7 +100,7 @@ pub fn install_with(broad_phase: &mut BroadPhaseBvh, config: PbigConfig) -> Resu
     Ok(())
 }
 
-/// As [`install`], with a finder of your own settings, perhaps a shadowed one.
+/// As [`install_with`], with a finder of your own settings, perhaps a shadowed one.
 pub fn install_finder(broad_phase: &mut BroadPhaseBvh, finder: impl PairFinder) {
     broad_phase.set_pair_finder(Some(Box::new(finder)));
 }

@@ -1,6 +1,7 @@
 //! Contracts of the kernels' texts: every kernel is valid WGSL, its bindings are the listed ones, and no file is missing
 //! in the lists. These tests need no device.
 
+mod integers;
 mod translate;
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};

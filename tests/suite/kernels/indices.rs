@@ -29,6 +29,21 @@ fn index_pairs_agrees_with_its_twin() {
     }
 }
 
+/// A device may round a square root as it likes, and a compiler may replace it.
+#[test]
+fn any_estimate_of_a_row_leads_to_the_pair() {
+    needs_gpu!();
+    let own = "return min(u32(max(row, 0.0)), n - 2u);";
+    for other in ["return 0u;", "return n - 2u;", "return k * 7919u % (n - 1u);"] {
+        for n in [2, 3, 90, 700] {
+            let before = indices(n, 0, pair_count(n.into()) as u32);
+            let wanted = after_twin(twin("index_pairs"), &before);
+            let found = counting("index_pairs", &[[own, other]], &with_capacity_for(&before, &wanted));
+            assert_eq!(twin("index_pairs").compare(&before, &found, &wanted), None, "{other} n {n}");
+        }
+    }
+}
+
 /// Returns the first difference of the pairs, or of an estimated row that is off by more than two rows.
 fn index_fault(before: &State) -> Option<String> {
     let kernel = twin("index_pairs");

@@ -5,6 +5,7 @@
 //! together instead.
 
 mod capacity;
+mod cells;
 mod changes;
 mod checks;
 mod compare;

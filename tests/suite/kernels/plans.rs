@@ -38,7 +38,8 @@ fn lattice(n: u32, step: f32, half: f32) -> Vec<Aabb> {
 #[test]
 fn each_size_of_many_boxes_has_a_level_beside_the_cell_for_everything() {
     let one_size = lattice(20, 1.0, 0.4);
-    let cells = 1.0 / plan(&one_size).scale;
+    let Params { tick_exponent, cells_per_tick, .. } = plan(&one_size);
+    let cells = 2f64.powi(tick_exponent - 150 + 16) / f64::from(cells_per_tick);
     assert!((0.4..4.0).contains(&cells), "{cells}");
     let huge = [one_size.clone(), vec![Aabb::new([-1e4; 3], [1e4; 3])]].concat();
     let two_sizes = [lattice(40, 1.0, 0.0005), lattice(10, 16.0, 8.0)].concat();

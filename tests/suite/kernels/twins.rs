@@ -104,7 +104,7 @@ pub(super) fn locate(s: &mut State) {
             continue;
         }
         s.counters.valid += 1;
-        let cells = |corner: [i32; 3]| [0, 1, 2].map(|k| finest_cell(&s.params, corner[k], k));
+        let cells = |corner: [i32; 3]| corner.map(|key| finest_cell(&s.params, key));
         let (low, high) = (cells(one.low), cells(one.high));
         let level = level_of(&s.params, low, high);
         let mut at = located_at(&s.params, low, high, level);
@@ -123,10 +123,12 @@ pub(super) fn float_of(key: i32) -> f32 {
     f32::from_bits(bits as u32)
 }
 
-pub(super) fn finest_cell(params: &Params, key: i32, k: usize) -> i32 {
-    let x = float_of(key.clamp(params.clamp_low[k], params.clamp_high[k]));
-    let cell = ((x - params.origin[k]) * params.scale).floor();
-    cell.clamp(-1073741760.0, 1073741760.0) as i32
+/// Returns the cell of an ordered integer at the finest resolution. No step rounds but the two that round down.
+pub(super) fn finest_cell(params: &Params, key: i32) -> i32 {
+    const REACH: f64 = 1073741824.0;
+    let ticks = (f64::from(float_of(key)) * 2f64.powi(150 - params.tick_exponent)).floor();
+    let above = ticks.clamp(-REACH, REACH - 1.0) + REACH;
+    ((above as u64 * u64::from(params.cells_per_tick)) >> 16) as i32
 }
 
 /// Returns the first level at which the box touches few cells on each axis, or the last level.
@@ -166,7 +168,7 @@ pub(super) fn cells_of(params: &Params, at: &Located, level: u32) -> Vec<(usize,
 }
 
 pub(super) fn cell_at(l: &Level, place: [i32; 3], lowest: [i32; 3]) -> (usize, u32) {
-    let wrapped = |k: usize| ((i64::from(place[k]) + (1 << 30)) % i64::from(l.dims[k])) as u32;
+    let wrapped = |k: usize| place[k] as u32 % l.dims[k];
     let index = l.first_cell + (wrapped(2) * l.dims[1] + wrapped(1)) * l.dims[0] + wrapped(0);
     let axes: u32 = (0..3).map(|k| u32::from(place[k] == lowest[k]) << k).sum();
     (index as usize, axes << AXIS_BITS)
@@ -233,8 +235,8 @@ pub(super) fn schedule(s: &mut State) {
 
 /// Returns about as many tests as a large cell needs, in units of LANES.
 fn large_tests(cell: &Cell) -> u32 {
-    let all = cell.residents as f32 * (cell.residents + 2 * cell.visitors) as f32 / (2 * LANES) as f32;
-    all.min(1073741824.0) as u32 + 1
+    let all = u64::from(cell.residents) * u64::from(cell.residents + 2 * cell.visitors);
+    (all / u64::from(2 * LANES)).min(1 << 30) as u32 + 1
 }
 
 pub(super) fn has_work(cell: &Cell) -> bool {

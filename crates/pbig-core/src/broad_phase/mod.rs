@@ -36,17 +36,17 @@ const AHEAD: usize = 16;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Events {
-    /// Pairs whose fat boxes overlap now and did not after the previous update.
+    /// Pairs that began: now their fat boxes overlap and their filters allow it, after the previous update they did not.
     pub added: Vec<Pair>,
-    /// Pairs whose fat boxes overlapped after the previous update and no longer do.
+    /// Pairs that ended: their fat boxes no longer overlap, or their filters no longer allow it.
     pub removed: Vec<Pair>,
 }
 
 /// Boxes by id, and the pairs between them, kept from update to update.
 ///
-/// Each box is stored fat, grown by [`Config::margin`]. While a later box stays inside its fat box, nothing has changed and
-/// nothing is done. Ids should be dense: each id up to the largest takes 64 bytes, used or not. The grid and the pairs come on
-/// top.
+/// Each box is stored fat, grown by [`Config::margin`]. While a later box stays inside its fat box, at most two margins from each
+/// of its sides, nothing has changed and nothing is done. Ids should be dense: each id up to the largest takes 64 bytes, used or
+/// not. The grid and the pairs come on top.
 ///
 /// An update in which few boxes have changed tests only these. An update in which many have changed sorts all boxes into a
 /// grid (or a tree, where a cell would hold too many), searches it, and compares the pairs with those of the last update. After a
@@ -138,7 +138,7 @@ impl BroadPhase {
     ///
     /// # Errors
     /// [`Error::TooManyBoxes`] when the id is not below [`crate::Limits::max_boxes`]; [`Error::SparseId`] when it is 2^24
-    /// or more, and over 64 times as large as any before.
+    /// or more, and over 64 times [`BroadPhase::id_count`].
     #[inline(always)]
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
         if self.world.set(id, aabb, filter, self.config.margin) {
@@ -213,7 +213,7 @@ impl BroadPhase {
 
     fn check_density(&self, id: u32) -> Result<(), Error> {
         let known = self.world.ids() as u32;
-        let is_sparse = id >= policy::SPARSE_FROM_ID && id / policy::MAX_ID_GROWTH > known;
+        let is_sparse = id >= policy::SPARSE_FROM_ID && id.div_ceil(policy::MAX_ID_GROWTH) > known;
         if is_sparse { Err(Error::SparseId { id, known }) } else { Ok(()) }
     }
 

@@ -31,7 +31,7 @@ impl BroadPhase {
         self.len() == 0
     }
 
-    /// Returns one more than the largest id that was ever set.
+    /// Returns one more than the largest id that was set since the last [`BroadPhase::clear`]. [`BroadPhase::shrink_to_fit`] may lower it.
     pub fn id_count(&self) -> u32 {
         self.world.ids() as u32
     }
@@ -61,8 +61,8 @@ impl BroadPhase {
         &self.world.boxes
     }
 
-    /// Returns the ids of changed boxes: set outside their fat box, given another filter, inserted or removed since the last
-    /// update. In the order of their first change.
+    /// Returns the ids of changed boxes: stored anew, given another filter, inserted or removed since the last update. In the
+    /// order of their first change.
     pub fn changes(&self) -> &[u32] {
         &self.world.changed
     }

@@ -210,7 +210,7 @@ fn boxes_are_counted_and_given_back() {
     broad_phase.shrink_to_fit();
     assert_eq!((broad_phase.id_count(), broad_phase.pair_count()), (6, 1));
     broad_phase.clear();
-    assert!(broad_phase.is_empty() && broad_phase.pair_count() == 0);
+    assert!(broad_phase.is_empty() && broad_phase.pair_count() == 0 && broad_phase.id_count() == 0);
 }
 
 /// Small boxes by the thousand within one large box's volume, with one of `gap` ids each.
@@ -276,7 +276,10 @@ fn an_id_far_above_the_others_is_an_error_and_takes_no_memory() {
     let id = 100_000_000;
     assert_eq!(broad_phase.set(id, cube, ProxyFilter::ALL), Err(Error::SparseId { id, known: 4 }));
     assert_eq!((broad_phase.len(), broad_phase.id_count()), (1, 4));
-    broad_phase.set(1 << 20, cube, ProxyFilter::ALL).expect("an id that costs 64 MB");
+    broad_phase.set((1 << 18) - 1, cube, ProxyFilter::ALL).expect("an id that costs 16 MB");
+    // One more than 64 times the known ids.
+    let id = (1 << 24) + 1;
+    assert_eq!(broad_phase.set(id, cube, ProxyFilter::ALL), Err(Error::SparseId { id, known: 1 << 18 }));
 }
 
 #[test]

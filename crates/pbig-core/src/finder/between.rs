@@ -12,8 +12,8 @@ use crate::{Boxes, CrossPair, Error, Order, Pair};
 const PIECE: usize = 1 << 16;
 
 impl Finder {
-    /// Returns every pair of a box of `a` with a box of `b` that overlap: `CrossPair { a: i, b: j }` for `a[i]` and `b[j]`,
-    /// sorted by `a`, then `b`.
+    /// Returns every pair of a box of `a` with a box of `b` that overlap: `CrossPair { a: i, b: j }` for `a[i]` and `b[j]`, in
+    /// the order that [`crate::Config::order`] says.
     ///
     /// Boxes of one set are never compared with each other, so a set may be a crowd. Its boxes that miss all of the other set cost
     /// a copy and a comparison or two; a few among many are sorted. [`Boxes`] add filters and keys. The CPU does the work; no device is asked.
@@ -35,11 +35,12 @@ impl Finder {
         a: impl Into<Boxes<'a>>,
         b: impl Into<Boxes<'a>>,
     ) -> Result<&[CrossPair], Error> {
+        self.pairs_between.clear();
         self.search_between(&a.into(), &b.into(), None)?;
         Ok(self.pairs_between())
     }
 
-    /// Returns the pairs of the last call of [`Finder::find_between`]; none if another call followed, or it failed.
+    /// Returns the pairs of the last call of [`Finder::find_between`]; none if it failed.
     pub fn pairs_between(&self) -> &[CrossPair] {
         bytemuck::cast_slice(&self.pairs_between)
     }
@@ -76,17 +77,23 @@ impl Finder {
         is_done?;
         self.report.pairs = self.all_pairs.count();
         if visit.is_none() {
-            self.emit(grouping);
-            self.name_ids();
+            self.emit_between(grouping);
         }
         Ok(())
+    }
+
+    /// Lists the pairs of two sets. The pairs of the last search of one set stay.
+    fn emit_between(&mut self, grouping: Option<Grouping>) {
+        std::mem::swap(&mut self.pairs, &mut self.pairs_between);
+        self.emit(grouping);
+        std::mem::swap(&mut self.pairs, &mut self.pairs_between);
+        self.name_ids();
     }
 
     /// Turns the places of a search into ids.
     fn name_ids(&mut self) {
         stage!("emit");
         let mut clock = Clock::start();
-        std::mem::swap(&mut self.pairs, &mut self.pairs_between);
         let (len, sets) = (self.pairs_between.len(), &self.sets);
         let (pairs, pieces) = (SharedSlice::new(&mut self.pairs_between), len.div_ceil(PIECE));
         run(threads_for(pieces), pieces, |_, piece| {

@@ -4,7 +4,7 @@ use super::cells::steps_portable;
 use super::edit::EditedGrid;
 use crate::Aabb;
 
-/// A cell of a grid, and the boxes whose lower corners lie in it.
+/// A cell of a grid with the boxes whose lower corners lie in it, or a leaf of a tree with its boxes.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct OccupiedCell {

@@ -35,7 +35,8 @@ pub enum NoDevice {
     FewBoxes,
     /// An update. On an H100 it took 0.9 to 2 times as long as on 16 threads, and 0.4 to 2 times as long as on four.
     Update,
-    /// The boxes of the last update are not known, after a restore: the CPU does one update, also with [`Backend::Device`].
+    /// The boxes of the last update are not known, after a restore or if the device came amid changes: the CPU does one update,
+    /// also with [`Backend::Device`].
     OldBoxesUnknown,
 }
 

@@ -62,7 +62,7 @@ pub(crate) const NS_PER_OVERSIZE_TEST: f64 = 1.5;
 /// Minimum id for which a jump far above the known ids is an error: the tables take 64 bytes for each id below.
 pub(crate) const SPARSE_FROM_ID: u32 = 1 << 24;
 
-/// Maximum factor between a new id and the largest earlier one, for ids from [`SPARSE_FROM_ID`] on.
+/// Maximum factor between a new id and the number of known ids, for ids from [`SPARSE_FROM_ID`] on.
 pub(crate) const MAX_ID_GROWTH: u32 = 64;
 
 /// Maximum number of boxes of the smaller of two sets for a test of every pair: a test takes 1.3 ns, sorting a box about 25.

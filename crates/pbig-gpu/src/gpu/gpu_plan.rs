@@ -5,8 +5,9 @@
 //! a level of their own are tested against all others, once (contract 4).
 
 use super::levels::{SizeRange, levels};
+use super::ticks::Ticks;
 use crate::GpuOptions;
-use crate::layout::{FEWEST_CELLS, Level, MAX_LEVELS, MAX_SPAN, Params, ordered};
+use crate::layout::{FEWEST_CELLS, Level, MAX_LEVELS, MAX_SPAN, Params};
 use crate::pbig::{Summary, density_cell, ordinary, pbig_cell, space_of};
 use pbig_core::{Aabb, internal::size_class_of};
 use std::fmt;
@@ -20,16 +21,15 @@ const MIN_CELLS_PER_LEVEL: f64 = 4096.0;
 const OCCUPANCY_LIMIT: f64 = 4.0;
 /// Fewest pairs of sampled boxes in one cell that count: a single coincidence would stand for many boxes.
 const FEWEST_SAMPLED_PAIRS: usize = 16;
-/// Maximum number of cells of the finest level from the middle of the world to its end. They must fit an `i32` with room to spare.
-const MAX_CELL: f64 = 1073741824.0;
+/// Maximum number of doublings from the finest cells to those of a level.
+const MAX_SHIFT: u32 = 28;
 
 /// The levels and cells of a search on a GPU.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct GpuPlan {
     /// Edge of the cells of the finest level, in the boxes' length unit.
     pub(super) cell: f32,
-    /// Lower corner of cell 0, in the boxes' length unit: the middle of most boxes.
-    origin: [f32; 3],
+    ticks: Ticks,
     /// Number of cells of all levels.
     pub(super) cells: u32,
     /// Levels, finest first. The last has one cell.
@@ -58,14 +58,11 @@ impl GpuPlan {
         let split = &split[split.len().saturating_sub(MAX_LEVELS - 1)..];
         let (space, low) = space_of(summary, &ordinary(summary));
         let edges = split.iter().map(|level| edge(level, summary, space, (options, cell_factor)));
-        let (cell, shifts) = powers_of_two(&edges.collect::<Vec<_>>(), split, space);
-        let mut plan = Self {
-            cell: cell as f32,
-            origin: std::array::from_fn(|k| low[k] + 0.5 * space[k]),
-            levels: Vec::new(),
-            cells: 0,
-        };
-        for (shift, level) in shifts {
+        let edges: Vec<f64> = edges.collect();
+        let ticks = Ticks::new(edges.first().copied().unwrap_or(1.0), reach(space, low));
+        let cell = ticks.cell();
+        let mut plan = Self { cell: cell as f32, ticks, levels: Vec::new(), cells: 0 };
+        for (shift, level) in shifts(&edges, split, cell) {
             let share = max_cells.saturating_sub(1) / split.len().max(1) as u32;
             let most =
                 (f64::from(level.all.boxes) * CELLS_PER_BOX).max(MIN_CELLS_PER_LEVEL).min(f64::from(share));
@@ -82,16 +79,9 @@ impl GpuPlan {
 
     /// Returns the kernels' parameters with those that the plan sets.
     pub(super) fn add_to(&self, params: Params) -> Params {
-        let scale = (1.0 / f64::from(self.cell)) as f32;
-        let reach = 0.99 * MAX_CELL / f64::from(scale);
-        let bound = |k: usize, reach: f64| {
-            ordered(((f64::from(self.origin[k]) + reach) as f32).clamp(f32::MIN, f32::MAX))
-        };
         let mut params = Params {
-            origin: self.origin,
-            scale,
-            clamp_low: std::array::from_fn(|k| bound(k, -reach)),
-            clamp_high: std::array::from_fn(|k| bound(k, reach)),
+            tick_exponent: self.ticks.exponent_bits(),
+            cells_per_tick: self.ticks.cells_per_tick,
             levels: self.levels.len() as u32,
             cells: self.cells,
             ..params
@@ -157,25 +147,25 @@ fn occupancy(sample: &[Aabb], boxes: u32, cell: f64) -> (f64, usize) {
     (others as f64 / n * (f64::from(boxes) / n), others)
 }
 
-/// Returns the finest cell, and for each level the number of doublings to its cells. Levels of equal cells are joined.
-/// Levels so coarse that the finest cells would not span the space are left out.
-fn powers_of_two<'a>(
-    edges: &[f64],
-    levels: &'a [SizeRange],
-    space: [f32; 3],
-) -> (f64, Vec<(u32, &'a SizeRange)>) {
-    let widest = f64::from(space.into_iter().fold(0.0, f32::max));
-    let finest = edges.first().copied().unwrap_or(1.0).max(4.0 * widest / MAX_CELL).clamp(1e-30, 1e30);
+/// Returns the largest distance from zero, on an axis, of most boxes.
+fn reach(space: [f32; 3], low: [f32; 3]) -> f64 {
+    let ends = low.into_iter().zip(space).flat_map(|(low, length)| [low, low + length]);
+    ends.map(|x| f64::from(x).abs()).fold(0.0, f64::max)
+}
+
+/// Returns for each level the number of doublings from the finest cell to its cells. Levels of equal cells are joined. Levels so
+/// coarse that the finest cells would not span the space are left out.
+fn shifts<'a>(edges: &[f64], levels: &'a [SizeRange], finest: f64) -> Vec<(u32, &'a SizeRange)> {
     let mut shifts: Vec<(u32, &SizeRange)> = Vec::new();
     for (edge, level) in edges.iter().zip(levels) {
         let shift = (edge / finest).log2().ceil().max(0.0) as u32;
         match shifts.last() {
-            _ if shift > 28 => break,
+            _ if shift > MAX_SHIFT => break,
             Some((last, _)) if shift <= *last => {}
             _ => shifts.push((shift, level)),
         }
     }
-    (finest, shifts)
+    shifts
 }
 
 /// Returns the number of cells on each axis: enough for the space, but at most `most` in all. Boxes beyond wrap around.
@@ -240,11 +230,10 @@ mod tests {
         ];
         for ((name, boxes, most), factor) in worlds.iter().flat_map(|world| [1.0, 1e-6].map(|f| (world, f))) {
             let plan = GpuPlan::new(&Summary::of(boxes), &OPTIONS, factor, 1 << 16);
-            let Params { origin, scale, levels, cells, clamp_low, clamp_high, .. } =
-                plan.add_to(Params::default());
-            assert!(origin.iter().chain([&scale]).all(|x| x.is_finite()) && scale > 0.0, "{name}: {plan:?}");
+            let Params { tick_exponent, cells_per_tick, levels, cells, .. } = plan.add_to(Params::default());
+            assert!((1..=248).contains(&tick_exponent), "{name}: {plan:?}");
+            assert!((1..=1 << 16).contains(&cells_per_tick), "{name}: {plan:?}");
             assert!(levels as usize <= *most && cells <= 1 << 16, "{name}: {plan}");
-            assert!((0..3).all(|k| clamp_low[k] <= clamp_high[k]), "{name}: {plan:?}");
         }
     }
 }

@@ -24,6 +24,7 @@ mod several;
 mod sink;
 mod storage;
 pub mod testing;
+mod ticks;
 mod upload;
 #[cfg_attr(target_arch = "wasm32", path = "wait_web.rs")]
 mod wait;

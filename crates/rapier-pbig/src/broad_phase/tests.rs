@@ -133,6 +133,7 @@ fn a_bad_length_unit_is_an_error_until_it_is_mended() {
         let params = IntegrationParameters { length_unit, ..IntegrationParameters::default() };
         broad_phase.update(&params, &colliders, &bodies, &handles[..1], &[], &mut Vec::new());
         assert_eq!(broad_phase.last_error().is_none(), is_good, "{length_unit}");
+        assert_eq!(broad_phase.colliders.core().config().margin, 0.01, "the margin stays");
     }
 }
 
