@@ -65,6 +65,11 @@ impl Budget {
         self.spent.load(Ordering::Relaxed)
     }
 
+    /// Adds work.
+    pub(crate) fn charge(&self, work: u64) {
+        self.spent.fetch_add(work, Ordering::Relaxed);
+    }
+
     /// Returns true if more than the limit was spent. The final answer depends on the work alone, not on the threads.
     pub(crate) fn is_over(&self) -> bool {
         self.spent() > self.limit

@@ -18,7 +18,7 @@ mod sort;
 pub(crate) mod tests;
 mod walk;
 
-use crate::grid::dispatch;
+use crate::grid::{Simd, dispatch};
 use crate::{Aabb, OccupiedCell};
 use node::{LANES, Node};
 use query::Cast;
@@ -116,6 +116,12 @@ impl BoxIndex {
     #[inline(always)]
     pub fn overlapping(&self, aabb: &Aabb, visit: impl FnMut(u32)) -> u64 {
         self.note(dispatch!(walk::overlapping, self, aabb, visit))
+    }
+
+    /// As [`BoxIndex::overlapping`], within a kernel. Nodes are not counted for a sort.
+    #[inline(always)]
+    pub(crate) fn overlaps(&self, simd: impl Simd, aabb: &Aabb, visit: impl FnMut(u32)) -> u64 {
+        walk::overlapping(simd, self, aabb, visit)
     }
 
     /// Counts nodes that a query has looked at, where they can lead to a sort. Queries of several threads may miss each other's: an

@@ -36,17 +36,70 @@ impl BoxIndex {
         }
     }
 
-    /// Reads the changed boxes, for an owner that looks up each of them. Returns false if the boxes should be sorted before.
-    pub(crate) fn follow(&mut self, boxes: &[Aabb], changed: &[u32]) -> bool {
+    /// Reads the changed boxes, for an owner that looks up each of them, and writes them in the order of their places to `order`.
+    /// Returns false if the boxes should be sorted before.
+    pub(crate) fn follow(&mut self, boxes: &[Aabb], changed: &[u32], order: &mut Vec<u64>) -> bool {
         // A clone is empty.
         if !self.is_sorted {
             return false;
         }
         self.has_moved = true;
-        changed.iter().for_each(|&id| self.take(id, boxes));
+        for &id in changed {
+            if self.places.get(id as usize).is_none_or(|place| *place == NONE) {
+                self.take(id, boxes);
+            }
+        }
+        self.in_order(changed, order);
+        dispatch!(Self::put_all, self, boxes, order);
         self.plan_sort();
         let is_loose = self.loose().len() > policy::loose_leaves(self.leaves);
         !is_loose && !self.wants_sort()
+    }
+
+    /// Writes ids in the order of their places: place and id in one word.
+    pub(crate) fn in_order(&self, ids: &[u32], order: &mut Vec<u64>) {
+        order.clear();
+        let place = |id: u32| self.places.get(id as usize).copied().unwrap_or(NONE);
+        order.extend(ids.iter().map(|id| u64::from(place(*id)) << 32 | u64::from(*id)));
+        order.sort_unstable();
+    }
+
+    /// Stores boxes in their places, and passes the bounds of their nodes on, level by level.
+    #[inline(always)]
+    fn put_all(simd: impl Simd, index: &mut Self, boxes: &[Aabb], order: &[u64]) {
+        let mut nodes: Vec<u32> = Vec::new();
+        for word in order {
+            let (place, id) = ((word >> 32) as u32, *word as u32);
+            if place != NONE {
+                let aabb = boxes.get(id as usize).unwrap_or(&Aabb::NOWHERE);
+                index.nodes[place as usize / LANES].set(place as usize % LANES, aabb);
+                if nodes.last() != Some(&(place / LANES as u32)) {
+                    nodes.push(place / LANES as u32);
+                }
+            }
+        }
+        while !nodes.is_empty() {
+            let mut parents = 0;
+            for i in 0..nodes.len() {
+                let at = nodes[i] as usize;
+                let bounds = simd.around(&index.nodes[at].boxes);
+                if index.bounds[at] == bounds {
+                    continue;
+                }
+                index.bounds[at] = bounds;
+                index.grown += usize::from(outgrows(&bounds, &mut index.extents[at]));
+                let place = index.parents[at];
+                if place != NONE {
+                    index.nodes[place as usize / LANES].set(place as usize % LANES, &bounds);
+                    let parent = place / LANES as u32;
+                    if parents == 0 || nodes[parents - 1] != parent {
+                        nodes[parents] = parent;
+                        parents += 1;
+                    }
+                }
+            }
+            nodes.truncate(parents);
+        }
     }
 
     /// Renames the boxes, as of the last sort: `names[id]` is the new id of the box `id`.

@@ -161,6 +161,17 @@ impl Kept {
         backward.row(id).iter().chain(self.forward.row(id)).copied()
     }
 
+    /// Makes the rows of `b`, if there are none.
+    pub(crate) fn make_backward(&self) {
+        self.backward.get_or_init(|| self.reversed());
+    }
+
+    /// Returns the partners of a box with lower ids, and those with larger ones, both sorted. After [`Kept::make_backward`].
+    #[inline(always)]
+    pub(crate) fn rows_of(&self, id: u32) -> (&[u32], &[u32]) {
+        (self.backward.get().map_or(&[], |rows| rows.row(id)), self.forward.row(id))
+    }
+
     /// Returns the partners of a box with larger ids, sorted.
     pub(crate) fn later_partners(&self, id: u32) -> &[u32] {
         self.forward.row(id)

@@ -12,4 +12,4 @@ mod row;
 pub(crate) use compare::Comparison;
 pub(crate) use groups::{Grouping, Groups};
 pub(crate) use kept::Kept;
-pub(crate) use row::{differences, equal};
+pub(crate) use row::{differences, equal, sort_few};

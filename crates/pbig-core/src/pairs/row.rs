@@ -35,6 +35,19 @@ pub(super) fn sort_into(
     }
 }
 
+/// Sorts a list that mostly has few ids.
+#[inline(always)]
+pub(crate) fn sort_few(simd: impl Simd, ids: &mut Vec<u32>) {
+    let len = ids.len();
+    if len > SHORT {
+        return ids.sort_unstable();
+    }
+    let mut eight = [0; SHORT];
+    eight[..len].copy_from_slice(ids);
+    let sorted = simd.sorted_short(&eight, len);
+    ids.copy_from_slice(&sorted[..len]);
+}
+
 /// Borrows the first elements of a row, and those behind it.
 #[inline(always)]
 fn first_eight(row: &[u32]) -> &[u32; SHORT] {

@@ -1,21 +1,26 @@
-//! The engine for few changed boxes where a tree is kept: each is looked up where it is, and what it overlaps is compared with its
-//! kept pairs.
+//! The update of few changed boxes: each is looked up in the tree where it is, and what it overlaps is compared with its kept pairs.
 
 use super::Task;
 use super::listed::Listed;
-use super::partners::Partners;
-use crate::grid::BLOCK;
+use crate::broad_phase::world::World;
+use crate::grid::{BLOCK, Budget, Simd, dispatch};
 use crate::holder::Holder;
+use crate::index::BoxIndex;
+use crate::memory::Pool;
 use crate::outcome::{End, Outcome};
+use crate::pairs::{Kept, differences, equal};
+use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy;
 use crate::report::{Clock, stage};
-use crate::{Algorithm, Checks, Plan};
+use crate::{Algorithm, Checks, Pair, Plan};
 
 /// The buffers of the engine.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LookUp {
-    partners: Partners,
     listed: Listed,
+    /// Changed boxes in the order of the tree: place and id.
+    order: Vec<u64>,
+    threads: Vec<Thread>,
 }
 
 impl LookUp {
@@ -28,46 +33,134 @@ impl LookUp {
         let refit = self.bring_up_to_date(task);
         outcome.stages.map = clock.lap();
         let max_work = task.unless_forced(policy::look_up_to_nodes(world.present.len()));
-        let (nodes, met) = self.look_up(task, max_work);
+        let budget = Budget::new(max_work);
+        self.look_up(task, &budget);
         outcome.stages.check = clock.lap();
+        let sum = |of: fn(&Thread) -> u64| self.threads.iter().map(of).sum::<u64>();
+        let (nodes, met) = (sum(|thread| thread.nodes), sum(|thread| thread.met));
         let made = nodes * BLOCK as u64;
         outcome.checks = Checks { made, unnecessary: made - met, redundant: 0 };
         outcome.work = refit + made + nodes + met;
         outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: world.valid, ..Plan::default() };
-        outcome.end = if nodes + met <= max_work { End::Done } else { End::GivenUp };
+        outcome.end = if budget.is_over() { End::GivenUp } else { End::Done };
         outcome
     }
 
     /// Refits the tree along the changed boxes, or sorts it. Returns the work, in boxes.
     fn bring_up_to_date(&mut self, task: &mut Task<'_>) -> u64 {
         let (world, tree) = (task.world, &mut task.store.tree);
-        if task.holder == Holder::Tree && tree.follow(&world.boxes, &world.changed) {
-            return world.changed.len() as u64;
+        let is_current = task.holder == Holder::Tree;
+        if !(is_current && tree.follow(&world.boxes, &world.changed, &mut self.order)) {
+            self.listed.take(world);
+            tree.sort(&self.listed.boxes);
+            tree.rename(&self.listed.ids);
+            tree.in_order(&world.changed, &mut self.order);
+            return (world.changed.len() + self.listed.ids.len()) as u64;
         }
-        self.listed.take(world);
-        tree.sort(&self.listed.boxes);
-        tree.rename(&self.listed.ids);
-        (world.changed.len() + self.listed.ids.len()) as u64
+        world.changed.len() as u64
     }
 
-    /// Looks the changed boxes up, and leaves the events. Returns the numbers of nodes looked at and of boxes met. If they are
-    /// more than `max_work` together, events are missing.
-    fn look_up(&mut self, task: &mut Task<'_>, max_work: u64) -> (u64, u64) {
+    /// Looks the changed boxes up, and leaves the events. Some are missing if the budget does not suffice.
+    fn look_up(&mut self, task: &mut Task<'_>, budget: &Budget) {
         let Task { world, kept, store, events, .. } = task;
-        events.clear();
-        let (mut nodes, mut met) = (0, 0);
-        for &id in &world.changed {
-            let (aabb, now) = (&world.boxes[id as usize], &mut self.partners.now);
-            now.clear();
-            nodes += store.tree.overlapping(aabb, |other| now.push(other));
-            now.sort_unstable();
-            met += now.len() as u64;
-            if nodes + met > max_work {
-                break;
+        let changed = self.order.len();
+        let workers = if changed < policy::PARALLEL_FROM_EDITS { 1 } else { available_threads() };
+        self.threads.resize_with(workers.max(self.threads.len()), Thread::default);
+        self.threads.iter_mut().for_each(Thread::clear);
+        kept.make_backward();
+        let (world, kept, tree, order) = (*world, &**kept, &store.tree, &self.order[..]);
+        let pieces = if workers == 1 { 1 } else { 8 * workers };
+        run_with(&mut self.threads[..workers], pieces, |thread, piece| {
+            let ids = &order[piece_range(changed, piece, pieces)];
+            if !budget.is_over() {
+                dispatch!(Thread::look_up, thread, (world, kept, tree), ids, budget);
             }
-            self.partners.compare_all(world, kept, id, events);
+        });
+        events.clear();
+        for thread in &mut self.threads {
+            events.added.extend_from_slice(&thread.added);
+            events.removed.extend_from_slice(&thread.removed);
+            events.dropped.extend_from_slice(&thread.dropped);
         }
         events.sort(world.ids());
-        (nodes, met)
+    }
+}
+
+/// The findings and buffers of one thread.
+#[derive(Clone, Debug, Default)]
+struct Thread {
+    /// Ids that the box at hand overlaps, and had as partners.
+    now: Vec<u32>,
+    was: Vec<u32>,
+    added: Pool<Pair>,
+    removed: Pool<Pair>,
+    dropped: Pool<Pair>,
+    nodes: u64,
+    met: u64,
+}
+
+impl Thread {
+    fn clear(&mut self) {
+        self.added.clear();
+        self.removed.clear();
+        self.dropped.clear();
+        (self.nodes, self.met) = (0, 0);
+    }
+
+    /// Looks up boxes, given as the lower halves of some words.
+    #[inline(always)]
+    fn look_up(
+        simd: impl Simd,
+        thread: &mut Self,
+        (world, kept, tree): (&World, &Kept, &BoxIndex),
+        ids: &[u64],
+        budget: &Budget,
+    ) {
+        for words in ids.chunks(64) {
+            let before = thread.nodes + thread.met;
+            for &word in words {
+                let id = word as u32;
+                thread.now.clear();
+                thread.nodes += tree.overlaps(simd, &world.boxes[id as usize], |other| thread.now.push(other));
+                thread.met += thread.now.len() as u64;
+                thread.compare(simd, world, kept, id);
+            }
+            budget.charge(thread.nodes + thread.met - before);
+            if budget.is_over() {
+                return;
+            }
+        }
+    }
+
+    /// Compares what a box overlaps with its kept pairs. Most boxes keep theirs.
+    #[inline(always)]
+    fn compare(&mut self, simd: impl Simd, world: &World, kept: &Kept, id: u32) {
+        let (lower, later) = kept.rows_of(id);
+        crate::pairs::sort_few(simd, &mut self.now);
+        let at = self.now.partition_point(|other| *other < id);
+        let is_met = self.now.get(at) == Some(&id);
+        let behind = at + usize::from(is_met);
+        let is_same = equal(lower, &self.now[..at]) && equal(later, &self.now[behind..]);
+        if !is_same || world.is_filtered || world.has_removed() {
+            self.compare_all(world, (lower, later), id);
+        }
+    }
+
+    /// Notes the differences. The changed box with the lower id reports a pair of two changed boxes.
+    #[inline(never)]
+    fn compare_all(&mut self, world: &World, (lower, later): (&[u32], &[u32]), id: u32) {
+        let Self { now, was, added, removed, dropped, .. } = self;
+        let is_own = |other: u32| other > id || other < id && world.change_of(other).is_none();
+        was.clear();
+        was.extend(lower.iter().chain(later).copied().filter(|other| is_own(*other)));
+        let filter = &world.filters[id as usize];
+        let allows = |other: u32| !world.is_filtered || filter.allows(&world.filters[other as usize]);
+        now.retain(|other| is_own(*other) && allows(*other));
+        if world.has_removed() {
+            let ended = |other: u32| world.was_removed(id) || world.was_removed(other);
+            dropped.extend(was.iter().filter(|other| ended(**other)).map(|&other| Pair::new(id, other)));
+            was.retain(|&other| !ended(other));
+        }
+        differences(id, was, now, added, removed);
     }
 }
