@@ -30,7 +30,7 @@ pub(crate) fn add_observers(world: &mut World) {
     let all = world.components().iter_registered();
     let colliders: Vec<_> = all.filter(|(_, info)| is_collider(info)).map(|(id, _)| id).collect();
     world.spawn(Observer::new(note::<Insert<Watched>>).with_components(colliders.clone()));
-    world.spawn(Observer::new(note::<Discard<Watched>>).with_components(colliders));
+    world.spawn(Observer::new(note::<Remove<Watched>>).with_components(colliders));
 }
 
 /// Notes an entity as a collider, as a body with all its colliders, and as a joint between two bodies.
@@ -47,6 +47,7 @@ fn note<E: EventPattern<Event: EntityEvent>>(
 }
 
 /// Sets the boxes of the proxies that avian lists as moved, if it has changed the list since the update: it clears the list next.
+/// So AABBs that a user updates within a step are seen, unless the user does so after this.
 pub(crate) fn follow_late(
     trees: Res<ColliderTrees>,
     moved: Res<MovedProxies>,

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use support::places::{Place, add_places};
 use support::record::{Compared, both};
 use support::ways::{Change, Kind, Lane, OF_ALL_AABBS, OF_BODIES, OF_COLLIDERS, OF_PARTS, Way, spawn};
-use support::{Number, collider};
+use support::{Divisor, Number, collider};
 
 const STEPS: u32 = 72;
 /// The steps in which targets change: while the ball that comes and goes is away, and while it is there.
@@ -56,7 +56,7 @@ fn change(world: &mut World, place: Place) {
 fn spawn_lanes(app: &mut App, kind: Kind, place: Place, ways: &[Way]) -> Vec<Lane> {
     // Which islands sleep depends on the order of contacts.
     app.insert_resource(TimeToSleep(f32::MAX));
-    app.insert_resource(Plan { place, changes: vec![] });
+    app.insert_resource(Plan { place, changes: vec![] }).insert_resource(Divisor(2));
     add_places(app, change);
     let lane = |(i, &(_, changes)): (u32, &Way)| {
         let lane = spawn_lane(app.world_mut(), kind, 20.0 * i as f32, NUMBERS * i);
@@ -96,14 +96,17 @@ fn run(kind: Kind, place: Place, at: [u32; 2], ways: &[Way], compared: &mut Comp
 
 /// Runs all ways at all places, for targets of a kind.
 fn run_all(kind: Kind) {
-    // The last ones touch other lanes.
-    let lists = [[OF_COLLIDERS, OF_PARTS, OF_BODIES].concat(), OF_ALL_AABBS.to_vec()];
     let (mut compared, mut faults) = (Compared::default(), vec![]);
+    let ways = [OF_COLLIDERS, OF_PARTS, OF_BODIES].concat();
     for place in Place::ALL {
-        for (at, ways) in CHANGES.iter().flat_map(|&at| lists.iter().map(move |ways| (at, ways))) {
-            let differences = run(kind, place, at, ways, &mut compared);
-            let name = |(way, step)| format!("{}: {place:?}, {at:?}, step {step}", ways[way as usize].0);
-            faults.extend(differences.into_iter().map(name));
+        // Those of all AABBs touch other lanes. Later avian clears its list of moved proxies at a time that no user knows.
+        let is_late = matches!(place, Place::Finalize | Place::AfterFinalize | Place::BeforeLast);
+        for ways in [&ways[..], OF_ALL_AABBS].into_iter().take(if is_late { 1 } else { 2 }) {
+            for at in CHANGES {
+                let differences = run(kind, place, at, ways, &mut compared);
+                let name = |(way, step)| format!("{}: {place:?}, {at:?}, step {step}", ways[way as usize].0);
+                faults.extend(differences.into_iter().map(name));
+            }
         }
     }
     println!("{kind:?}: {compared:?}");
