@@ -248,7 +248,7 @@ impl BroadPhase {
     /// Gives back the memory that the boxes and pairs at hand do not need.
     pub fn shrink_to_fit(&mut self) {
         self.world.shrink();
-        self.kept.shrink();
+        self.kept.shrink(self.world.ids());
         (self.store, self.engines) = (Store::default(), Engines::default());
         self.device.changed = Vec::new();
         self.comparison = Scratch::default();

@@ -42,7 +42,7 @@ pub(crate) use simd::{BLOCK, Eight, EightBoxes, Portable, Simd, dispatch, prefet
 pub(crate) use spacing::GridPlan;
 pub use spacing::NeighbourScan;
 
-use crate::memory::{ShrinkingVec, Scratch};
+use crate::memory::{Scratch, ShrinkingVec};
 use build::BucketCounts;
 
 /// A grid with its buffers.

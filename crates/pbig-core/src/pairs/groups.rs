@@ -223,7 +223,12 @@ fn sort_roughly(pairs: &[Pair], to: &mut Vec<Pair>, counts: &mut Vec<u32>, ids: 
 }
 
 /// Sorts pairs: roughly by `a` first if they are many.
-pub(super) fn sort(pairs: &mut ShrinkingVec<Pair>, sorted: &mut ShrinkingVec<Pair>, counts: &mut Vec<u32>, ids: usize) {
+pub(super) fn sort(
+    pairs: &mut ShrinkingVec<Pair>,
+    sorted: &mut ShrinkingVec<Pair>,
+    counts: &mut Vec<u32>,
+    ids: usize,
+) {
     let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
     if pairs.len() < 1 << RADIX_BITS {
         return pairs.sort_unstable_by_key(word);

@@ -3,7 +3,7 @@
 use super::groups::Span;
 use crate::Pair;
 use crate::grid::prefetch;
-use crate::memory::{ShrinkingVec, Scratch};
+use crate::memory::{Scratch, ShrinkingVec};
 use std::sync::OnceLock;
 
 /// Minimum room of a row that has outgrown its place.
@@ -276,11 +276,13 @@ impl Kept {
         self.turned.settle(events);
     }
 
-    /// Gives back memory that the kept pairs do not need.
-    pub(crate) fn shrink(&mut self) {
+    /// Gives back memory that the kept pairs do not need. No pair has an id of `ids` or more.
+    pub(crate) fn shrink(&mut self, ids: usize) {
         (self.next, self.turned) = Default::default();
         self.backward.take();
         self.forward.pool.shrink_to_fit();
+        self.forward.spans.truncate(ids);
+        self.lower.truncate(ids);
         self.forward.spans.shrink_to_fit();
         self.lower.shrink_to_fit();
     }
