@@ -6,7 +6,7 @@ use crate::broad_phase::world::World;
 use crate::grid::{BLOCK, Budget, Simd, dispatch};
 use crate::holder::Holder;
 use crate::index::BoxIndex;
-use crate::memory::Pool;
+use crate::memory::ShrinkingVec;
 use crate::outcome::{End, Outcome};
 use crate::pairs::{Kept, differences, equal};
 use crate::parallel::{available_threads, piece_range, run_with};
@@ -92,9 +92,9 @@ struct Thread {
     /// Ids that the box at hand overlaps, and had as partners.
     now: Vec<u32>,
     was: Vec<u32>,
-    added: Pool<Pair>,
-    removed: Pool<Pair>,
-    dropped: Pool<Pair>,
+    added: ShrinkingVec<Pair>,
+    removed: ShrinkingVec<Pair>,
+    dropped: ShrinkingVec<Pair>,
     nodes: u64,
     met: u64,
 }
