@@ -3,13 +3,14 @@
 use avian::collider_tree::{
     ColliderTreeProxy, ColliderTreeProxyKey, ColliderTreeType, ColliderTrees, MovedProxies,
 };
-use avian::prelude::ColliderDisabled;
+use bevy::ecs::change_detection::Tick;
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 use pbig_core::{Aabb, BroadPhase, Error, Pair, ProxyFilter};
 use std::collections::BTreeSet;
 
-/// The keys of the proxies of colliders that take part in collisions.
-pub(crate) type Keys<'w, 's> = Query<'w, 's, &'static ColliderTreeProxyKey, Without<ColliderDisabled>>;
+/// The keys of the proxies of all colliders. One without a proxy has a key that no tree knows.
+pub(crate) type Keys<'w, 's> = Query<'w, 's, &'static ColliderTreeProxyKey, Allow<Disabled>>;
 
 /// Pairs, each as it is and turned, so that those of an id are a range.
 type Waiting = BTreeSet<[u32; 2]>;
@@ -27,6 +28,8 @@ pub struct ColliderBoxes {
     moved: Vec<u32>,
     /// Colliders that begin anew in the next update.
     pub(crate) lost: BTreeSet<Entity>,
+    /// When avian had last written to its list of moved proxies, at the last update.
+    pub(crate) moved_at: Tick,
     /// Overlapping pairs that a joint or a hook vetoes, or that nobody asked for since their contact was removed.
     pub(crate) waiting: Waiting,
 }
@@ -97,7 +100,7 @@ impl ColliderBoxes {
     }
 
     /// Sets the box of a collider, unless its key is out of date.
-    fn set(&mut self, trees: &ColliderTrees, slot: Slot) -> Result<(), Error> {
+    pub(crate) fn set(&mut self, trees: &ColliderTrees, slot: Slot) -> Result<(), Error> {
         let aabb = trees.tree_for_type(slot.key.tree_type()).get_proxy_aabb(slot.key.id());
         let Some((proxy, aabb)) = slot.proxy(trees).zip(aabb) else { return Ok(()) };
         let id = self.store(slot);
@@ -152,16 +155,18 @@ fn waiting_of_moved(waiting: &Waiting, moved: &[u32], has_moved: impl Fn(u32) ->
 }
 
 /// Returns the filter of a proxy: layers, body, and the trees that avian searches for it. Static colliders pair with each other
-/// only if one is a sensor, and standalone ones never do.
+/// only if one is a sensor, and colliders without a body never do. `ColliderOf` may name an entity that is no body: then the
+/// filter leaves the owner out, because a later entity may have its index.
 fn filter(key: ColliderTreeProxyKey, proxy: &ColliderTreeProxy) -> ProxyFilter {
-    // Kinds: 1 moves, or is a static sensor; 2 is static; 4 is standalone.
+    // Kinds: 1 moves, or is a static sensor; 2 is static; 4 has no body.
     let (kind, accepted_kinds) = match key.tree_type() {
         ColliderTreeType::Static if !proxy.is_sensor() => (2, 0),
-        ColliderTreeType::Standalone => (4, !4),
+        ColliderTreeType::Standalone if proxy.body.is_none() => (4, !4),
         _ => (1, u8::MAX),
     };
+    let body = proxy.body.filter(|_| !key.is_standalone());
     ProxyFilter {
-        body: proxy.body.map_or(ProxyFilter::NO_BODY, |body| body.index_u32()),
+        body: body.map_or(ProxyFilter::NO_BODY, |body| body.index_u32()),
         kind,
         accepted_kinds,
         memberships: proxy.layers.memberships.0,

@@ -37,8 +37,8 @@ pub use boxes::ColliderBoxes;
 pub use pbig_core;
 pub use shadow::Shadow;
 
-use avian::collider_tree::ColliderTreeSystems;
 use avian::collision::broad_phase::BroadPhaseSystems;
+use avian::collision::narrow_phase::CollisionEventSystems;
 use avian::prelude::*;
 use bevy::ecs::system::SystemParamItem;
 use bevy::prelude::*;
@@ -65,8 +65,8 @@ impl<H: CollisionHooks> Default for PbigBroadPhasePlugin<H> {
 
 impl<H: CollisionHooks> PbigBroadPhasePlugin<H> {
     /// Makes the plugin compare its pairs with those of avian's own broad phase, which stays in charge. [`Shadow`] has the result.
-    /// Add it beside `BvhBroadPhasePlugin`, without which all pairs are spurious, and with the same hooks. They are asked again about
-    /// pairs that they forbid.
+    /// Add it beside `BvhBroadPhasePlugin`, and with the same hooks. They are asked again about pairs that they forbid. Without avian's
+    /// own broad phase all pairs are spurious, and a warning says so.
     ///
     /// ```
     /// use avian::prelude::*; // avian2d or avian3d
@@ -92,13 +92,13 @@ where
     for<'w, 's> SystemParamItem<'w, 's, H>: CollisionHooks,
 {
     fn build(&self, app: &mut App) {
-        app.init_resource::<ColliderBoxes>();
-        lost::add_observers(app);
+        let late = lost::follow_late.in_set(PhysicsStepSystems::Finalize).after(CollisionEventSystems);
+        app.init_resource::<ColliderBoxes>().add_systems(PhysicsSchedule, late.ambiguous_with_all());
         if self.is_shadow {
             let system = shadow::compare::<H>
                 .in_set(PhysicsStepSystems::BroadPhase)
                 .after(BroadPhaseSystems::CollectCollisions)
-                .before(ColliderTreeSystems::BeginOptimize);
+                .before(BroadPhaseSystems::Last);
             app.init_resource::<Shadow>().add_systems(PhysicsSchedule, system);
         } else {
             // Avian's schedule panics at an ambiguity; `finish` warns of the one that can be.
@@ -109,10 +109,15 @@ where
     }
 
     fn finish(&self, app: &mut App) {
-        if !self.is_shadow && app.is_plugin_added::<BvhBroadPhasePlugin<H>>() {
-            warn!(
+        lost::add_observers(app.world_mut());
+        match (self.is_shadow, app.is_plugin_added::<BvhBroadPhasePlugin<H>>()) {
+            (false, true) => warn!(
                 "avian's own broad phase runs beside pbig: `.disable::<BvhBroadPhasePlugin>()` saves its time"
-            );
+            ),
+            (true, false) => warn!(
+                "avian's own broad phase is missing, or has other hooks: leave out `.as_shadow()`, or pbig compares with nothing"
+            ),
+            _ => {}
         }
     }
 }

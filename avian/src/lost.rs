@@ -1,44 +1,65 @@
-//! Colliders whose contacts avian has removed although their AABBs may still overlap.
+//! Colliders that begin anew in the next update, because avian has changed their proxies or removed their contacts.
 //!
-//! Avian finds such a pair again when one of its colliders moves. pbig reports a pair once, when it begins. So these colliders
-//! begin anew: their boxes are removed and set again, and pbig reports their pairs again. The observers below match those of
-//! avian's narrow phase, of its joint graph, and of the layers that its narrow phase reads. Colliders that are enabled, or given
-//! to another body, are here, too: avian clears its list of moved proxies at the end of a step, perhaps before pbig has seen them.
+//! Avian's trees change at any time. Its list of moved proxies tells which did, but avian clears it at the end of a step, perhaps
+//! before pbig has seen it. Avian also removes contacts of AABBs that still overlap, and finds such a pair again when one of its
+//! colliders moves. pbig reports a pair once, when it begins. So these colliders begin anew: their boxes are removed and set again,
+//! and pbig reports their pairs again. The observers below watch all components that avian's trees, narrow phase and joint graph
+//! watch. A collider that begins anew for nothing does no harm.
 
-use crate::boxes::ColliderBoxes;
+use crate::boxes::{ColliderBoxes, Slot};
+use avian::collider_tree::{ColliderTrees, MovedProxies};
 use avian::dynamics::joints::joint_graph::JointGraph;
 use avian::prelude::*;
+use bevy::ecs::component::ComponentInfo;
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::event::{EntityEvent, EventPattern};
 use bevy::prelude::*;
 
-type Removed = (Disabled, ColliderDisabled, ColliderMarker, ColliderOf, Sensor, RigidBodyDisabled, RigidBody);
+/// Components that decide about proxies and contacts, beside colliders. None of them can be written to: users insert and remove
+/// them.
+type Watched = (
+    (Disabled, ColliderDisabled, ColliderMarker, ColliderOf, CollisionLayers, Sensor),
+    (RigidBody, RigidBodyDisabled, JointCollisionDisabled),
+);
 
-pub(crate) fn add_observers(app: &mut App) {
-    app.add_observer(note::<Add<(Disabled, ColliderDisabled, Sensor, RigidBodyDisabled)>>)
-        .add_observer(note::<Remove<Removed>>)
-        .add_observer(note::<Insert<(ColliderOf, CollisionLayers, RigidBody)>>)
-        .add_observer(note_joint);
+/// Watches colliders of all types. Their plug-ins must be built.
+pub(crate) fn add_observers(world: &mut World) {
+    let marker = world.register_component::<ColliderMarker>();
+    let is_collider =
+        |info: &ComponentInfo| info.required_components().iter_direct_ids().any(|id| id == marker);
+    let all = world.components().iter_registered();
+    let colliders: Vec<_> = all.filter(|(_, info)| is_collider(info)).map(|(id, _)| id).collect();
+    world.spawn(Observer::new(note::<Insert<Watched>>).with_components(colliders.clone()));
+    world.spawn(Observer::new(note::<Remove<Watched>>).with_components(colliders));
 }
 
-/// Notes an entity as a collider, and as a body with all its colliders.
+/// Notes an entity as a collider, as a body with all its colliders, and as a joint between two bodies.
 fn note<E: EventPattern<Event: EntityEvent>>(
     trigger: On<E>,
+    joints: Res<JointGraph>,
     bodies: Query<&RigidBodyColliders, Allow<Disabled>>,
     mut boxes: ResMut<ColliderBoxes>,
 ) {
     let entity = trigger.event_target();
+    let joined = joints.bodies_of(entity).into_iter().flatten();
     boxes.lost.insert(entity);
-    boxes.lost.extend(bodies.get(entity).into_iter().flat_map(|colliders| colliders.iter()));
+    boxes.lost.extend(bodies.iter_many(joined.chain([entity])).flatten().flatten());
 }
 
-/// Notes the colliders of both bodies when a joint begins to disable their collisions.
-fn note_joint(
-    trigger: On<Add<JointCollisionDisabled>>,
-    joints: Res<JointGraph>,
-    bodies: Query<&RigidBodyColliders>,
+/// Sets the boxes of the proxies that avian lists as moved, if it has changed the list since the update: it clears the list next.
+/// So AABBs that a user updates within a step are seen, unless the user does so after this.
+pub(crate) fn follow_late(
+    trees: Res<ColliderTrees>,
+    moved: Res<MovedProxies>,
     mut boxes: ResMut<ColliderBoxes>,
 ) {
-    let both = joints.bodies_of(trigger.entity).into_iter().flatten();
-    boxes.lost.extend(bodies.iter_many(both).flatten().flat_map(|colliders| colliders.iter()));
+    if moved.last_changed() == boxes.moved_at {
+        return;
+    }
+    for &key in moved.proxies() {
+        let Some(collider) = trees.get_proxy(key).map(|proxy| proxy.collider) else { continue };
+        if boxes.set(&trees, Slot { key, collider, moved: None }).is_err() {
+            boxes.lost.insert(collider);
+        }
+    }
 }

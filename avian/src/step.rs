@@ -34,6 +34,7 @@ where
         graph: &mut G,
         mut add: impl FnMut(&mut G, [&ColliderTreeProxy; 2]),
     ) {
+        self.boxes.moved_at = self.moved.last_changed();
         for pair in self.boxes.update(&self.trees, &self.moved, &self.keys) {
             let slots = self.boxes.slots(pair);
             if graph.contains(slots[0].collider, slots[1].collider) {
@@ -59,8 +60,11 @@ where
         [[first, second], [second, first]].into_iter().find(looks).map(|order| order.map(|(_, proxy)| proxy))
     }
 
-    /// Returns true if no joint and no hook forbids the contact.
+    /// Returns true if the colliders have different owners, and no joint and no hook forbids the contact.
     fn allows(&mut self, [one, other]: [&ColliderTreeProxy; 2]) -> bool {
+        if one.body == other.body {
+            return false;
+        }
         if let (Some(one), Some(other)) = (one.body, other.body)
             && self.joints.joints_between(one, other).any(|joint| joint.collision_disabled)
         {

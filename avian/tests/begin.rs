@@ -4,7 +4,7 @@ mod support;
 
 use avian::prelude::*;
 use bevy::prelude::*;
-use support::{app_with_pbig, collider};
+use support::{Number, app_with_pbig, collider};
 
 struct Two {
     app: App,
@@ -15,10 +15,10 @@ impl Two {
     /// Two overlapping balls, with a contact.
     fn new() -> Self {
         let mut app = app_with_pbig();
-        let ids = [0.0, 0.4].map(|x| {
+        let ids = [(0.0, 3), (0.4, 4)].map(|(x, number)| {
             let body =
                 (RigidBody::Dynamic, GravityScale(0.0), collider(1.0), Transform::from_xyz(x, 0.0, 0.0));
-            app.world_mut().spawn(body).id()
+            app.world_mut().spawn((body, Number(number))).id()
         });
         let mut two = Self { app, ids };
         two.step();
@@ -104,9 +104,8 @@ fn layers_that_change_for_a_step() {
 #[test]
 fn a_veto_that_ends() {
     let mut two = Two::new();
-    let sum = two.ids[0].index_u32() + two.ids[1].index_u32();
     two.edit(|e| _ = e.insert((ActiveCollisionHooks::FILTER_PAIRS, ColliderDisabled)));
-    two.app.world_mut().resource_mut::<support::Divisor>().0 = sum;
+    two.app.world_mut().resource_mut::<support::Divisor>().0 = 3 + 4;
     two.step();
     two.edit(|e| _ = e.remove::<ColliderDisabled>());
     two.step();

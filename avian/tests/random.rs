@@ -2,37 +2,64 @@
 
 mod support;
 
-use avian::collider_tree::{ColliderTreeProxyKey, ColliderTreeSystems, ColliderTrees, MovedProxies};
+use avian::collider_tree::{ColliderTreeProxyKey, ColliderTrees, MovedProxies};
 use avian::collision::broad_phase::BroadPhaseSystems;
 use avian::prelude::*;
 use avian_pbig::{ColliderBoxes, PbigBroadPhasePlugin, Shadow};
 use bevy::prelude::*;
 use std::collections::HashMap;
-use support::{Divisor, Number, RandomWorld, Veto, app, app_with_pbig, plugins};
+use support::random::{Plan, RandomWorld};
+use support::record::{Compared, both};
+use support::{Number, Veto, app, app_with_pbig, plugins};
 
-/// Steps a random world, with changes in each step.
-fn run(app: &mut App, seed: u64, bodies: usize, steps: usize) {
-    let mut world = RandomWorld::new(app, seed, bodies);
-    for step in 0..steps {
-        // Quiet steps let bodies come to rest.
-        let changes = if step % 4 == 3 { 0 } else { bodies / 20 + 1 };
-        world.change(app, changes);
-        app.update();
-    }
+/// Returns the seeds of a number of worlds, times `PBIG_AVIAN_WORLDS`.
+fn seeds(first: u64, worlds: u64) -> std::ops::Range<u64> {
+    let times = std::env::var("PBIG_AVIAN_WORLDS").map_or(1, |times| times.parse().expect("a number"));
+    first..first + worlds * times
+}
+
+fn plan(seed: u64, bodies: usize, steps: usize) -> Plan {
+    Plan { seed, bodies, steps, is_locked: false, has_changes_within: true }
 }
 
 #[test]
 fn pairs_equal_those_of_avian() {
-    let mut compared = 0;
-    for (seed, bodies) in [(1, 30), (2, 300), (3, 300), (4, 5000)] {
+    let (mut compared, mut steps, mut within) = (0, 0, 0);
+    for seed in seeds(100, 4) {
+        let plan = plan(seed, [30, 300, 300, 5000][seed as usize % 4], 320);
         let mut app = app(plugins().add(PbigBroadPhasePlugin::<Veto>::default().as_shadow()));
-        run(&mut app, seed, bodies, 320);
+        plan.run(&mut app);
         let shadow = app.world().resource::<Shadow>();
         assert!(shadow.missing.is_empty(), "seed {seed}: {shadow:?}");
         assert!(shadow.spurious.is_empty(), "seed {seed}: {shadow:?}");
         compared += shadow.compared;
+        steps += plan.steps;
+        within += app.world().resource::<RandomWorld>().changes_within;
     }
+    println!("shadow: {compared} contacts compared in {steps} steps, {within} changes within steps");
     assert!(compared > 1_000_000, "{compared} contacts compared");
+}
+
+/// Two worlds that change alike: in each step, avian's own broad phase leaves the same contacts and events.
+#[test]
+fn contacts_and_events_equal_those_of_avian() {
+    let (mut compared, mut within) = (Compared::default(), 0);
+    for seed in seeds(1000, 6) {
+        let plan = Plan { is_locked: true, ..plan(seed, [30, 200, 400][seed as usize % 3], 160) };
+        let mut apps = both();
+        apps.iter_mut().for_each(|app| plan.add_to(app));
+        for step in 0..plan.steps {
+            apps.iter_mut().for_each(|app| plan.change(app, step));
+            let [ours, avians] = compared.step(&mut apps);
+            assert!(
+                ours == avians,
+                "seed {seed}, step {step}: only with pbig {ours:?}, only with avian's own {avians:?}"
+            );
+        }
+        within += apps[0].world().resource::<RandomWorld>().changes_within;
+    }
+    println!("{compared:?}, {within} changes within steps");
+    assert!(compared.contacts > 100_000 && compared.events > 1000, "{compared:?}");
 }
 
 /// Pairs that avian's own broad phase would add after pbig.
@@ -42,14 +69,15 @@ struct Missed(Vec<(Entity, Entity)>);
 /// Avian's own broad phase runs after pbig, and must find nothing.
 #[test]
 fn avian_finds_nothing_after_pbig() {
-    let mut app = app_with_pbig();
-    app.init_resource::<Missed>();
-    let place =
-        note_missed.after(BroadPhaseSystems::CollectCollisions).before(ColliderTreeSystems::BeginOptimize);
-    app.add_systems(PhysicsSchedule, place.in_set(PhysicsStepSystems::BroadPhase));
-    run(&mut app, 5, 400, 200);
-    assert_eq!(app.world().resource::<Missed>().0, []);
-    assert!(app.world().resource::<ColliderBoxes>().broad_phase().len() > 300);
+    for seed in seeds(5, 2) {
+        let mut app = app_with_pbig();
+        app.init_resource::<Missed>();
+        let place = note_missed.after(BroadPhaseSystems::CollectCollisions).before(BroadPhaseSystems::Last);
+        app.add_systems(PhysicsSchedule, place.in_set(PhysicsStepSystems::BroadPhase));
+        plan(seed, 400, 200).run(&mut app);
+        assert_eq!(app.world().resource::<Missed>().0, []);
+        assert!(app.world().resource::<ColliderBoxes>().broad_phase().len() > 300);
+    }
 }
 
 /// Tests each moved proxy against every other, by avian's rules.
@@ -57,7 +85,7 @@ fn note_missed(
     (trees, moved): (Res<ColliderTrees>, Res<MovedProxies>),
     graph: Res<ContactGraph>,
     joints: Res<avian::dynamics::joints::joint_graph::JointGraph>,
-    keys: Query<&ColliderTreeProxyKey, Without<ColliderDisabled>>,
+    keys: Query<&ColliderTreeProxyKey>,
     hooks: Veto,
     mut commands: Commands,
     mut missed: ResMut<Missed>,
@@ -99,7 +127,7 @@ fn note_missed(
 fn contacts_are_in_the_same_order_each_time() {
     let contacts = || {
         let mut app = app_with_pbig();
-        run(&mut app, 6, 300, 60);
+        plan(6, 300, 60).run(&mut app);
         let graph = app.world().resource::<ContactGraph>();
         let pairs = graph.active_pairs().iter().chain(graph.sleeping_pairs());
         pairs.map(|pair| (pair.collider1, pair.collider2)).collect::<Vec<_>>()
@@ -122,9 +150,9 @@ fn contacts_have_their_colliders_in_avians_order() {
     let (mut compared, mut turned) = (0, 0);
     for seed in 10..20 {
         let [ours, avians] = [app_with_pbig(), app(plugins())].map(|mut app| {
-            RandomWorld::new(&mut app, seed, 300).change(&mut app, 15);
-            // The hooks look at entities, which differ.
-            app.insert_resource(Divisor(0));
+            let plan = plan(seed, 300, 1);
+            plan.add_to(&mut app);
+            plan.change(&mut app, 0);
             app.update();
             ends_by_pair(&app)
         });

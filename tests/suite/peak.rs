@@ -1,7 +1,7 @@
 //! Memory comes back after a peak is over, piece by piece, and a clone copies no scratch. Bytes are counted, on one thread.
 
 use pbig_core::{Aabb, BroadPhase, Config, Finder, ProxyFilter};
-use pbig_harness::counting::held;
+use pbig_harness::counting::{held, peak};
 
 const BOXES: u32 = 60_000;
 
@@ -32,12 +32,12 @@ fn an_update_gives_back_what_a_clump_has_left() {
         let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("no margin");
         (0..10).for_each(|update| step(&mut broad_phase, update, false));
         let before = held() - start;
+        peak();
         (10..13).for_each(|update| step(&mut broad_phase, update, true));
         let pairs = broad_phase.pair_count() as i64;
         assert!(pairs > 25 * i64::from(BOXES), "{pairs} pairs");
         step(&mut broad_phase, 13, false);
-        // Memory is kept for some updates, so this is that of the update.
-        let peak = held() - start;
+        let peak = peak() - start;
         assert!(peak > 5 * before && peak - before < 70 * pairs, "{} bytes a pair", (peak - before) / pairs);
         let pieces = (14..213).map(|update| {
             let held_before = held();
@@ -48,6 +48,37 @@ fn an_update_gives_back_what_a_clump_has_left() {
         let after = held() - start;
         assert!(2 * after < 3 * before, "{before}, then {peak}, then {after} bytes");
         assert!(largest < (peak - before) / 20, "{largest} of {} bytes at once", peak - before);
+    });
+}
+
+/// Boxes that were added once and sleep keep what a search for their pairs needs. Removed boxes leave only their ids.
+#[test]
+fn memory_comes_back_without_changes_and_without_boxes() {
+    on_one_thread(|| {
+        let start = held();
+        let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("no margin");
+        step(&mut broad_phase, 0, true);
+        let pairs = broad_phase.pair_count() as i64;
+        let idle = |broad_phase: &mut BroadPhase| {
+            (0..200).for_each(|_| assert!(broad_phase.update().expect("no change").added.is_empty()));
+            held() - start
+        };
+        let asleep = idle(&mut broad_phase);
+        assert!(asleep < 180 * i64::from(BOXES) + 27 * pairs, "{asleep} bytes, {pairs} pairs");
+
+        (100..BOXES).for_each(|id| _ = broad_phase.remove(id));
+        let left = |update: u32| {
+            (0..100).for_each(|id| {
+                broad_phase.set(id, cube(id, update, true), ProxyFilter::ALL).expect("an id below the limit");
+            });
+            broad_phase.update().expect("few pairs");
+            held() - start
+        };
+        let few = (0..400).map(left).last().unwrap_or(0);
+        assert!(few < 96 * i64::from(BOXES), "{few} bytes for ids");
+        broad_phase.shrink_to_fit();
+        let shrunk = held() - start;
+        assert!(shrunk < 50_000, "{shrunk} bytes for 100 boxes");
     });
 }
 
@@ -75,7 +106,14 @@ fn a_finder_shrinks_to_its_lists() {
         let boxes: Vec<Aabb> = (0..BOXES).map(|id| cube(id, 0, true)).collect();
         let start = held();
         let mut finder = Finder::default();
+        peak();
         let pairs = finder.find(&boxes).expect("few enough pairs").to_vec();
+        let each = (peak() - start) / pairs.len() as i64;
+        assert!((16..40).contains(&each), "{each} bytes a pair, with the copy");
+        let before = held();
+        let clone = finder.clone();
+        assert_eq!(held() - before, 8 * clone.pairs().len() as i64, "a clone has the list");
+        drop(clone);
         finder.shrink_to_fit();
         assert_eq!(held() - start, 16 * pairs.len() as i64, "a list and its copy");
         assert_eq!(finder.find(&boxes).expect("few enough pairs"), pairs);

@@ -98,7 +98,8 @@ pub trait BoxStore<A: Bounds>: Clone + Debug + Default + Send + Sync {
     /// Returns a box of the core in the world's coordinates.
     fn widen(&self, aabb: Aabb) -> A;
 
-    /// Returns a box of the core and its velocity that meet, within the narrowed time, at least the boxes that this one meets.
+    /// Returns a box of the core and its velocity that meet, within the narrowed time, at least the boxes that this one meets: all,
+    /// if the velocity is beyond f32.
     fn narrow_motion(&self, start: &A, velocity: &[A::Real; 3]) -> (Aabb, [f32; 3]);
 
     /// Returns a point of the core that has, within the narrowed distance, at least the boxes that this one has.

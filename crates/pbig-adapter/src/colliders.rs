@@ -176,6 +176,7 @@ impl<T: Tree> Colliders<T> {
         self.tree.expire();
         self.read(scene, margins);
         self.index.note(self.core.changes(), self.core.id_count());
+        self.index.prepare(&self.core);
         self.tree.note(self.boxes.changes(&self.core).iter().copied(), self.registry.len());
         self.find_and_send(|handle| scene.size(handle), send);
         self.counts.totals.failures += u64::from(self.last_error.is_some());

@@ -4,7 +4,7 @@
 use crate::policy;
 use crate::{Colliders, Tree};
 use pbig_core::{Aabb, BoxIndex, BroadPhase};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// A scene query, by the boxes that it looks for.
@@ -69,7 +69,9 @@ impl<T: Tree<Aabb = Aabb>> Colliders<T> {
 pub(crate) struct SceneIndex {
     fresh: OnceLock<Fresh>,
     stale: Mutex<Stale>,
-    /// Questions that a grid has answered since the index was fresh.
+    /// A query has read the index since an update made it fresh.
+    is_read: AtomicBool,
+    /// Overlap queries that a grid has answered since the index was fresh.
     asked_of_grid: AtomicU32,
 }
 
@@ -114,10 +116,10 @@ impl SceneIndex {
         self.stale.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns true if a grid should answer a question about a box: the index is stale, and few have asked since.
+    /// Returns true if a grid should answer an overlap query: the index is stale, and few have asked since.
     pub(crate) fn prefers_grid(&self) -> bool {
         let is_fresh = self.fresh.get().is_some();
-        !is_fresh && self.asked_of_grid.fetch_add(1, Ordering::Relaxed) < policy::QUESTIONS_TO_GRID
+        !is_fresh && self.asked_of_grid.fetch_add(1, Ordering::Relaxed) < policy::QUERIES_TO_GRID
     }
 
     /// Notes changed boxes before an update forgets them.
@@ -136,10 +138,21 @@ impl SceneIndex {
         }
     }
 
-    /// Asks the index of the boxes as they are. The first query after a change brings it up to date.
+    /// Makes the index fresh within an update, where threads may share the work, if queries have read it since the last one.
+    pub(crate) fn prepare(&mut self, core: &BroadPhase) {
+        if std::mem::take(self.is_read.get_mut()) && self.fresh.get().is_none() {
+            self.fresh = self.refreshed(core, BoxIndex::refresh).into();
+        }
+    }
+
+    /// Asks the index of the boxes as they are. The first query after a change brings it up to date, alone, because others may wait
+    /// for it.
     #[inline(always)]
     pub(crate) fn ask(&self, core: &BroadPhase, ask: impl FnOnce(&BoxIndex) -> u64) {
-        let fresh = self.fresh.get_or_init(|| self.refreshed(core));
+        let fresh = self.fresh.get_or_init(|| self.refreshed(core, BoxIndex::refresh_alone));
+        if !self.is_read.load(Ordering::Relaxed) {
+            self.is_read.store(true, Ordering::Relaxed);
+        }
         let index = fresh.sorted.get().unwrap_or(&fresh.index);
         ask(index);
         if index.wants_sort() {
@@ -149,17 +162,17 @@ impl SceneIndex {
 
     /// Takes the stale index, and brings it up to date.
     #[cold]
-    fn refreshed(&self, core: &BroadPhase) -> Fresh {
+    fn refreshed(&self, core: &BroadPhase, refresh: fn(&mut BoxIndex, &[Aabb], Option<&[u32]>)) -> Fresh {
         let stale = std::mem::take(&mut *self.stale.lock().unwrap_or_else(PoisonError::into_inner));
         let Stale { mut index, mut changed, knows_changes } = stale;
         changed.extend_from_slice(core.changes());
-        index.refresh(core.fat_aabbs(), knows_changes.then_some(&changed[..]));
+        refresh(&mut index, core.fat_aabbs(), knows_changes.then_some(&changed[..]));
         Fresh { index, sorted: OnceLock::new(), sorting: Mutex::new(()) }
     }
 }
 
 impl Fresh {
-    /// Sorts the boxes for later queries, unless another query does it just now.
+    /// Sorts the boxes for later queries, unless another query does it just now. Both orders are held until the boxes change.
     #[cold]
     fn sort(&self, core: &BroadPhase) {
         let sort = || {
@@ -172,3 +185,6 @@ impl Fresh {
         }
     }
 }
+
+#[cfg(all(test, feature = "parallel"))]
+mod tests;

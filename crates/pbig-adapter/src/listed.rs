@@ -48,7 +48,7 @@ impl<T: Tree> Colliders<T> {
     #[inline(always)]
     pub(crate) fn set_proxy(&mut self, handle: Handle, proxy: Proxy<T::Aabb>, is_listed: bool) {
         match proxy {
-            Proxy::Enabled(aabb, filter, is_asleep) => {
+            Proxy::Enabled { aabb, filter, is_asleep } => {
                 let is_still = is_asleep || BodyKind::of(&filter) == BodyKind::Fixed;
                 let is_new_and_still = is_listed && is_still && !self.registry.contains(handle);
                 let own = self.margins.own(&aabb, is_new_and_still);

@@ -13,8 +13,15 @@ pub enum Proxy<A> {
     Disabled,
     /// Its AABB is not finite: it keeps its last box, and has this filter.
     Unplaced(ProxyFilter),
-    /// Its AABB without margin, its filter, and true if its body sleeps.
-    Enabled(A, ProxyFilter, bool),
+    /// It takes part.
+    Enabled {
+        /// Without margin.
+        aabb: A,
+        /// Which pairs it wants.
+        filter: ProxyFilter,
+        /// Its body is fixed or sleeps.
+        is_asleep: bool,
+    },
 }
 
 /// The arguments of an update.

@@ -93,8 +93,8 @@ pub(crate) struct Store {
 
 impl Store {
     /// Gives back memory that the boxes of the last search did not need.
-    pub(crate) fn settle(&mut self) {
-        self.grid.settle();
+    pub(crate) fn settle(&mut self, holder: Holder) {
+        self.grid.settle(holder == Holder::Grid);
     }
 
     /// Renames the boxes that a search has left: `names[id]` is the new id of the box `id`.

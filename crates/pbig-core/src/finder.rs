@@ -51,7 +51,7 @@ pub fn find_pairs(boxes: &[Aabb]) -> Result<Vec<Pair>, Error> {
 pub struct Finder {
     config: Config,
     device: DeviceSlot,
-    store: Store,
+    store: Scratch<Store>,
     all_pairs: Scratch<AllPairs>,
     groups: Scratch<Groups>,
     sets: Scratch<Sets>,
@@ -201,7 +201,7 @@ impl Finder {
         &self.pairs
     }
 
-    /// Gives back the memory that the lists of the last call do not need.
+    /// Gives back all memory but the lists of the last call. A device keeps its own.
     ///
     /// ```
     /// use pbig_core::{Aabb, Finder};

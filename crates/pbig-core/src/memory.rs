@@ -2,11 +2,11 @@
 
 use std::ops::{Deref, DerefMut};
 
-/// Number of updates after which an earlier need is forgotten, at least.
-const WINDOW: usize = 64;
+/// Number of updates whose needs are remembered. The oldest part of them is forgotten at once, so that at least 64 are.
+const WINDOW: usize = 72;
 
-/// Parts of the window. The need of a part is forgotten at once.
-const PARTS: usize = 8;
+/// Parts of the window.
+const PARTS: usize = 9;
 
 /// Maximum ratio of a list's capacity to what the window needed.
 const MAX_SPARE: usize = 4;
@@ -17,12 +17,12 @@ const PIECES: usize = 80;
 /// Part of the need, as one in this number, that is left beside it.
 const SPARE: usize = 4;
 
-/// Capacity that is never given back, in elements.
+/// Capacity that is never given back, and the least part of it that is given back at once, in elements.
 const SMALL: usize = 4096;
 
 /// A list whose length differs from update to update, and what it needed in the last ones.
 #[derive(Clone, Debug)]
-pub(crate) struct Pool<T> {
+pub(crate) struct ShrinkingVec<T> {
     list: Vec<T>,
     /// By part of the window: the largest number of elements needed.
     needs: [usize; PARTS],
@@ -32,15 +32,19 @@ pub(crate) struct Pool<T> {
     piece: usize,
 }
 
-impl<T> Default for Pool<T> {
+impl<T> Default for ShrinkingVec<T> {
     fn default() -> Self {
         Self { list: Vec::new(), needs: [0; PARTS], updates: 0, piece: 0 }
     }
 }
 
-impl<T> Pool<T> {
-    /// Notes how many elements an update needed, which stay. Gives a piece of the memory back if the window needed much less than there is.
+impl<T> ShrinkingVec<T> {
+    /// Notes how many elements an update needed. Gives a piece of the memory back if the window needed much less than there is: only
+    /// elements behind those needed may be lost.
     pub(crate) fn settle(&mut self, needed: usize) {
+        if self.list.capacity() <= SMALL {
+            return;
+        }
         if self.piece > 0 && self.needs.iter().all(|earlier| *earlier < needed) {
             self.piece = 0;
         }
@@ -49,7 +53,7 @@ impl<T> Pool<T> {
         self.needs[part] = if is_new { needed } else { self.needs[part].max(needed) };
         self.updates += 1;
         // Until the first window has passed, the largest need is not known.
-        if self.updates > WINDOW && self.list.capacity() > SMALL {
+        if self.updates > WINDOW {
             self.shrink(self.needs.into_iter().max().unwrap_or(0));
         }
     }
@@ -57,7 +61,7 @@ impl<T> Pool<T> {
     fn shrink(&mut self, most: usize) {
         let (capacity, wanted) = (self.list.capacity(), most + most / SPARE + SMALL);
         if capacity > MAX_SPARE * most + SMALL {
-            self.piece = self.piece.max((capacity - wanted).div_ceil(PIECES));
+            self.piece = self.piece.max((capacity - wanted).div_ceil(PIECES)).max(SMALL);
         }
         if self.piece > 0 && capacity > wanted {
             let left = wanted.max(capacity - self.piece);
@@ -66,7 +70,7 @@ impl<T> Pool<T> {
         }
     }
 
-    /// As [`Pool::settle`], for as many elements as there are. Removes them.
+    /// As [`ShrinkingVec::settle`], for as many elements as there are. Removes them.
     pub(crate) fn settle_and_clear(&mut self) {
         let needed = self.list.len();
         self.list.clear();
@@ -79,7 +83,7 @@ impl<T> Pool<T> {
     }
 }
 
-impl<T> Deref for Pool<T> {
+impl<T> Deref for ShrinkingVec<T> {
     type Target = Vec<T>;
 
     #[inline(always)]
@@ -88,7 +92,7 @@ impl<T> Deref for Pool<T> {
     }
 }
 
-impl<T> DerefMut for Pool<T> {
+impl<T> DerefMut for ShrinkingVec<T> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut Vec<T> {
         &mut self.list
@@ -123,8 +127,8 @@ impl<T> DerefMut for Scratch<T> {
 mod tests {
     use super::*;
 
-    fn pool(capacity: usize) -> Pool<u8> {
-        Pool { list: vec![0; capacity], ..Pool::default() }
+    fn pool(capacity: usize) -> ShrinkingVec<u8> {
+        ShrinkingVec { list: vec![0; capacity], ..ShrinkingVec::default() }
     }
 
     #[test]
@@ -139,7 +143,7 @@ mod tests {
             assert_eq!(pool.len(), 10_000);
             capacities.push(pool.capacity());
         }
-        assert!(capacities[..55].iter().all(|capacity| *capacity >= 1_000_000), "{capacities:?}");
+        assert!(capacities[..63].iter().all(|capacity| *capacity >= 1_000_000), "{capacities:?}");
         assert!(capacities[199] <= 12_500 + SMALL, "{capacities:?}");
         let pieces = capacities.windows(2).map(|two| two[0] - two[1]);
         assert!(pieces.max().is_some_and(|piece| piece <= 1_000_000 / PIECES), "{capacities:?}");

@@ -6,13 +6,32 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use threads::run_workers;
-pub(crate) use threads::{available_threads, both};
+pub(crate) use threads::{alone, available_threads, both};
 
 #[cfg(feature = "parallel")]
 mod threads {
+    use std::cell::Cell;
+
+    thread_local! {
+        static IS_ALONE: Cell<bool> = const { Cell::new(false) };
+    }
+
+    /// Does work on the caller's thread alone. Who holds a lock must not share work: a thread that waits for others may be given
+    /// work that asks for the same lock, and so may the others.
+    pub(crate) fn alone<T>(work: impl FnOnce() -> T) -> T {
+        struct Reset(bool);
+        impl Drop for Reset {
+            fn drop(&mut self) {
+                IS_ALONE.set(self.0);
+            }
+        }
+        let _reset = Reset(IS_ALONE.replace(true));
+        work()
+    }
+
     /// Returns how many threads can work on one call, the caller included.
     pub(crate) fn available_threads() -> usize {
-        rayon::current_num_threads()
+        if IS_ALONE.get() { 1 } else { rayon::current_num_threads() }
     }
 
     /// Runs `take_pieces(worker)` on `workers` threads.
@@ -26,6 +45,10 @@ mod threads {
 
     /// Does two works at once, if a thread is free for the first.
     pub(crate) fn both(first: impl FnOnce() + Send, second: impl FnOnce()) {
+        if available_threads() == 1 {
+            first();
+            return second();
+        }
         rayon::in_place_scope(|scope| {
             scope.spawn(|_| first());
             second();
@@ -36,6 +59,10 @@ mod threads {
 /// The caller alone.
 #[cfg(not(feature = "parallel"))]
 mod threads {
+    pub(crate) fn alone<T>(work: impl FnOnce() -> T) -> T {
+        work()
+    }
+
     pub(crate) fn available_threads() -> usize {
         1
     }

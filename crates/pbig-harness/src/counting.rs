@@ -18,6 +18,7 @@ pub fn switch_on() {
 
 thread_local! {
     static HELD: Cell<i64> = const { Cell::new(0) };
+    static PEAK: Cell<i64> = const { Cell::new(0) };
     static LARGEST: Cell<usize> = const { Cell::new(0) };
     static REQUESTS: Cell<u64> = const { Cell::new(0) };
 }
@@ -29,6 +30,7 @@ fn count<const ALWAYS: bool>(asked: usize, returned: usize) {
     }
     // Where a thread ends its sums may be gone before the last block is.
     _ = HELD.try_with(|held| held.set(held.get() + asked as i64 - returned as i64));
+    _ = HELD.try_with(|held| PEAK.try_with(|peak| peak.set(peak.get().max(held.get()))));
     _ = LARGEST.try_with(|largest| largest.set(largest.get().max(asked)));
     _ = REQUESTS.try_with(|requests| requests.set(requests.get() + u64::from(asked > 0)));
 }
@@ -65,6 +67,11 @@ pub fn held() -> i64 {
     HELD.get()
 }
 
+/// Returns the most bytes that this thread has held since the last call.
+pub fn peak() -> i64 {
+    PEAK.replace(held()).max(held())
+}
+
 /// Returns the largest block that this thread has requested since the last call.
 pub fn largest() -> usize {
     LARGEST.replace(0)
@@ -92,7 +99,8 @@ mod tests {
         largest();
         assert!(std::hint::black_box(vec![0u8; 5000]).len() == 5000 && largest() == 5000 && largest() < 5000);
         drop(some);
-        assert_eq!(held(), before);
+        assert_eq!((held(), peak() - before), (before, 9000));
+        assert_eq!(peak(), before);
         // A vector, its growth and another vector; what is given back does not count.
         assert_eq!(requests() - asked, 3);
     }

@@ -27,7 +27,8 @@ impl<'a> Call<'a> {
             Some(collider) if !collider.is_enabled() => Proxy::Disabled,
             Some(collider) => {
                 let is_asleep = body.is_some_and(RigidBody::is_sleeping);
-                Proxy::Enabled(aabb_of(self.params, body, collider), filter_with(body, collider), is_asleep)
+                let (aabb, filter) = (aabb_of(self.params, body, collider), filter_with(body, collider));
+                Proxy::Enabled { aabb, filter, is_asleep }
             }
         }
     }

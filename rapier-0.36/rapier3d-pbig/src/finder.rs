@@ -68,7 +68,7 @@ impl PairFinder for PbigFinder {
 
     fn visit(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> Real) {
         use pbig_adapter::SceneQuery as Query;
-        // A call for each kind: a query that was copied into one place would be read before it is written.
+        // A call for each kind, because one for all would first copy the query into memory, which takes as long as a ray that misses.
         match *query {
             SceneQuery::Ray(ray, time) => {
                 let origin = spatial(ray.origin);

@@ -26,7 +26,7 @@ impl Call<'_> {
         let body = parent_of(self.bodies, collider);
         let (filter, is_asleep) = (filter_with(body, collider), body.is_some_and(RigidBody::is_sleeping));
         match self.aabb_of(collider) {
-            Some(aabb) => Proxy::Enabled(from_tree(&aabb), filter, is_asleep),
+            Some(aabb) => Proxy::Enabled { aabb: from_tree(&aabb), filter, is_asleep },
             // Rapier's own broad phase also keeps the last box. Rapier disables such a collider at the end of the step.
             None => Proxy::Unplaced(filter),
         }

@@ -21,7 +21,8 @@ impl<A: Bounds> Lattice<A> {
     fn proxy(&self, i: usize) -> (Handle, Proxy<A>) {
         let kind = if i.is_multiple_of(3) { BodyKind::Fixed } else { BodyKind::Dynamic };
         let groups = Groups { memberships: 1, mask: 1, mode: TestMode::And };
-        ((i as u32, 0).into(), Proxy::Enabled(self.aabb(i), filter_of(None, kind, 0, groups), i % 3 == 2))
+        let (aabb, filter) = (self.aabb(i), filter_of(None, kind, 0, groups));
+        ((i as u32, 0).into(), Proxy::Enabled { aabb, filter, is_asleep: i % 3 == 2 })
     }
 }
 

@@ -30,8 +30,8 @@ pub(crate) struct Args {
     /// Numbers of boxes for `steady`, instead of its own.
     #[arg(long, value_name = "N,N", value_parser = whole::<usize>(BODIES), value_delimiter = ',', allow_negative_numbers = true)]
     boxes: Vec<usize>,
-    /// Scene queries after each step of `step`, several kinds separated by commas: none, ray, rays-100, rays-10000, cast,
-    /// character, boxes or point.
+    /// Scene queries after each step of `step`, several kinds separated by commas: none, ray, rays-100, rays-10000, rays-to-middle,
+    /// cast, character, boxes or point.
     #[arg(long, value_name = "KIND", value_delimiter = ',', value_parser = FrameKind::named)]
     queries: Vec<FrameKind>,
 }

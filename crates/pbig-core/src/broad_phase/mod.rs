@@ -50,7 +50,8 @@ pub struct Events {
 ///
 /// An update in which few boxes have changed tests only these. An update in which many have changed sorts all boxes into a
 /// grid (or a tree, where a cell would hold too many), searches it, and compares the pairs with those of the last update. After a
-/// peak it takes time for the boxes that are left.
+/// peak it takes time for the boxes that are left. Memory for pairs, events and the grid comes back by itself, a piece an update; that
+/// for ids and trees by [`BroadPhase::shrink_to_fit`].
 ///
 /// ```
 /// use pbig_core::{Aabb, BroadPhase, Config, Pair, ProxyFilter};
@@ -241,7 +242,7 @@ impl BroadPhase {
     /// Gives back the memory that the boxes and pairs at hand do not need.
     pub fn shrink_to_fit(&mut self) {
         self.world.shrink();
-        self.kept.shrink();
+        self.kept.shrink(self.world.ids());
         (self.store, self.engines) = (Store::default(), Engines::default());
         self.comparison = Scratch::default();
         self.holder = Holder::Nothing;

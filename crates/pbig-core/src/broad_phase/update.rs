@@ -4,6 +4,7 @@ use super::engines::Task;
 use super::{BroadPhase, Events};
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
+use crate::pairs::Comparison;
 use crate::policy::{self, Counts, Work};
 use crate::report::Clock;
 use crate::{Backend, Engine, Error, Plan};
@@ -132,11 +133,12 @@ impl BroadPhase {
 
     /// Gives back a piece of the memory that a peak has left.
     fn settle(&mut self) {
-        let (pairs, events) = (self.kept.len(), self.last_events);
+        let Comparison { added, removed, dropped, .. } = &*self.comparison;
+        let (pairs, events) = (self.kept.len(), added.len() + removed.len() + dropped.len());
         self.engines.settle(pairs);
         self.comparison.settle(events);
         self.kept.settle(events);
-        self.store.settle();
+        self.store.settle(self.holder);
     }
 
     /// Returns the number of old states to keep until the next update.

@@ -76,6 +76,7 @@ impl Grid {
     }
 
     fn reserve(&mut self, boxes: usize) {
+        self.room = boxes;
         ensure_scratch(&mut self.coarse, boxes, Record::EMPTY);
         ensure_scratch(&mut self.records, boxes, Record::EMPTY);
         ensure_scratch(&mut self.codes, boxes + 2 * BLOCK, TOMBSTONE);
@@ -84,7 +85,8 @@ impl Grid {
 
     /// Computes keys, and counts boxes by bucket.
     fn count(&mut self, boxes: &[Aabb], split: Split, workers: usize) {
-        self.counts.resize(split.pieces.max(self.counts.len()), BucketCounts::ZERO);
+        let pieces = split.pieces.max(self.counts.len());
+        self.counts.resize(pieces, BucketCounts::ZERO);
         // In the memory of the codes, which are computed when the keys are no longer needed.
         let keys: &mut [u32] = bytemuck::cast_slice_mut(&mut self.codes);
         let (keys, counts) = (SharedSlice::new(keys), SharedSlice::new(&mut self.counts));

@@ -43,8 +43,8 @@ pub(super) struct Spill {
 
 impl EditedGrid {
     /// Gives back memory that the boxes of the last search did not need.
-    pub(crate) fn settle(&mut self) {
-        self.grid.settle();
+    pub(crate) fn settle(&mut self, holds_boxes: bool) {
+        self.grid.settle(holds_boxes);
     }
 }
 

@@ -7,7 +7,7 @@
 use super::record::Record;
 use super::simd::{BLOCK, Simd, eight_from, prefetch};
 use crate::boxes::share_no_key;
-use crate::memory::Pool;
+use crate::memory::ShrinkingVec;
 use crate::pairs::Grouping;
 use crate::policy::search::{WORK_OF_EXACT_TEST, WORK_OF_VAGUE_TEST};
 use crate::{Keys, Pair, ProxyFilter};
@@ -79,7 +79,7 @@ pub(crate) struct Hits {
     queries: Vec<u32>,
     places: Vec<u32>,
     /// The pairs, in no particular order.
-    pub(crate) pairs: Pool<Pair>,
+    pub(crate) pairs: ShrinkingVec<Pair>,
     /// By group of `a` (`a >> group_shift`): pairs found. Empty if pairs are not counted by group.
     pub(crate) groups: Vec<u32>,
     pub(crate) group_shift: u32,

@@ -42,7 +42,7 @@ pub(crate) use simd::{BLOCK, Eight, EightBoxes, Portable, Simd, dispatch, prefet
 pub(crate) use spacing::GridPlan;
 pub use spacing::NeighbourScan;
 
-use crate::memory::{Pool, Scratch};
+use crate::memory::{Scratch, ShrinkingVec};
 use build::BucketCounts;
 
 /// A grid with its buffers.
@@ -50,30 +50,34 @@ use build::BucketCounts;
 pub(crate) struct Grid {
     pub(crate) plan: GridPlan,
     /// By slot, sorted by cell; where boxes stay in buckets, by bucket. Longer than `len`.
-    records: Pool<Record>,
+    records: ShrinkingVec<Record>,
     /// By slot; tombstones beyond `len`, so that a block can be read anywhere. While the
     /// grid is built, and where boxes stay in buckets, the keys of the boxes.
-    codes: Pool<u64>,
+    codes: ShrinkingVec<u64>,
     /// By cell: its first slot. Out of date where boxes stay in buckets.
-    starts: Pool<u32>,
+    starts: ShrinkingVec<u32>,
     /// Slots in use.
     pub(crate) len: usize,
+    /// Boxes of the last build; 0 once they are elsewhere.
+    room: usize,
     /// Boxes too large for the cells.
     pub(crate) oversize: Vec<Record>,
     /// The records by bucket, of the last build.
-    coarse: Scratch<Pool<Record>>,
-    counts: Vec<BucketCounts>,
+    coarse: Scratch<ShrinkingVec<Record>>,
+    counts: Scratch<Vec<BucketCounts>>,
     bucket_starts: Vec<u32>,
 }
 
 impl Grid {
-    /// Gives back memory that the boxes of the last build did not need.
-    fn settle(&mut self) {
-        let (len, cells) = (self.len, self.starts.len().min(self.plan.cells.count() + 4));
-        self.records.settle(len);
-        self.coarse.settle(len);
-        self.codes.settle(len + 2 * BLOCK);
+    /// Gives back memory that the boxes did not need, neither for a build since the last call nor because the grid holds them.
+    fn settle(&mut self, holds_boxes: bool) {
+        let room = self.room;
+        let cells = if room > 0 { self.starts.len().min(self.plan.cells.count() + 4) } else { 0 };
+        self.records.settle(room);
+        self.coarse.settle(room);
+        self.codes.settle(room + 2 * BLOCK);
         self.starts.settle(cells);
+        self.room = if holds_boxes { room } else { 0 };
     }
 
     /// Returns the codes of eight slots.

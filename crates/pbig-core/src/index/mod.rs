@@ -1,11 +1,11 @@
-//! An index of boxes for questions: rays, moving boxes, boxes, points.
+//! An index of boxes for queries: rays, moving boxes, boxes, points.
 //!
 //! ```text
-//! boxes by id ─► sort (rarely) ─► nodes of eight boxes, eight nodes, ... ◄─ refit (before a question, if boxes moved)
+//! boxes by id ─► sort (rarely) ─► nodes of eight boxes, eight nodes, ... ◄─ refit (before a query, if boxes moved)
 //! ```
 //!
 //! A tree of nodes with eight children each. It is refitted in one pass over its nodes, children first. Sorting is left until
-//! questions have looked at enough nodes for a sort to pay.
+//! queries have looked at enough nodes for a sort to pay.
 
 #![allow(clippy::needless_range_loop, reason = "a lane of several arrays")]
 
@@ -24,9 +24,9 @@ use node::{LANES, Node};
 use query::Cast;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Boxes by id, for questions about places: which boxes does a ray, a moving box, a box or a point meet?
+/// Boxes by id, for queries about places: which boxes does a ray, a moving box, a box or a point meet?
 ///
-/// The index holds copies of boxes. [`BoxIndex::refresh`] brings it up to date; questions see the boxes of the last refresh.
+/// The index holds copies of boxes. [`BoxIndex::refresh`] brings it up to date; queries see the boxes of the last refresh.
 ///
 /// ```
 /// use pbig_core::{Aabb, BoxIndex};
@@ -61,17 +61,23 @@ pub struct BoxIndex {
     grown: usize,
     /// By id: the lane of its box, or `NONE`.
     places: Vec<u32>,
-    /// Lengths of the list of boxes at the last layout, and now.
+    /// Length of the list of boxes at the last layout.
     listed: usize,
+    /// Length of the list of boxes at the last refresh.
     known: usize,
     is_sorted: bool,
     /// Boxes may have moved since the last sort.
     has_moved: bool,
     /// Nodes that queries have looked at since the last sort; not counted while no sort is wanted.
-    looked_at: AtomicU64,
+    looked_at: Count,
     /// Nodes for queries to look at before a sort pays; none if no number of them is enough.
     sort_after: Option<u64>,
 }
+
+/// A count on a cache line of its own: queries of other threads read what would lie beside it.
+#[derive(Debug, Default)]
+#[repr(align(64))]
+struct Count(AtomicU64);
 
 impl Clone for BoxIndex {
     /// Returns an empty index, which its first [`BoxIndex::refresh`] fills.
@@ -85,10 +91,10 @@ impl BoxIndex {
     /// moving box at time 0 (a point for a ray), `velocity` its motion in a unit of time.
     ///
     /// `visit` returns the time until which further boxes are wanted; boxes that are met just after it may be visited as well. After
-    /// a time of 0 only boxes that are met at time 0 are visited, and of these only those with lower ids: so a caller that takes
-    /// the lowest id of several at one time needs no others. After a negative time none is visited. No box is visited twice. With a
-    /// NaN in the query, or a negative `max_time`, no box is visited. Returns the number of nodes, of eight boxes each, that were
-    /// tested.
+    /// a time of 0 only boxes that are met at time 0 are visited, and of these (unless `max_time` is 0) only those with lower ids: so
+    /// a caller that takes the lowest id of several at one time needs no others. After a negative time none is visited. No box is
+    /// visited twice. With a NaN in the query, or a negative `max_time`, no box is visited. Returns the number of nodes, of eight
+    /// boxes each, that were tested.
     #[inline(always)]
     pub fn cast_aabb(
         &self,
@@ -106,25 +112,28 @@ impl BoxIndex {
     }
 
     /// Visits the ids of boxes within a distance of a point, about the nearest first. `visit` returns the distance up to which
-    /// further boxes are wanted, by the rules of [`BoxIndex::cast_aabb`]. Returns the number of nodes that were tested.
+    /// further boxes are wanted, by the rules of [`BoxIndex::cast_aabb`]; a box that holds the point is at distance 0. With a
+    /// number in the point that is not finite, or a negative `max_distance`, no box is visited. Returns the number of nodes that
+    /// were tested.
     #[inline(always)]
     pub fn near(&self, point: [f32; 3], max_distance: f32, visit: impl FnMut(u32) -> f32) -> u64 {
         self.note(dispatch!(walk::near, self, (point, max_distance), visit))
     }
 
-    /// Visits the ids of boxes that overlap a box, in no particular order. Returns the number of nodes that were tested.
+    /// Visits the ids of boxes that overlap a box, in no particular order: none if it is invalid. Returns the number of nodes that
+    /// were tested.
     #[inline(always)]
     pub fn overlapping(&self, aabb: &Aabb, visit: impl FnMut(u32)) -> u64 {
         self.note(dispatch!(walk::overlapping, self, aabb, visit))
     }
 
-    /// Counts nodes that a query has looked at, where they can lead to a sort. Queries of several threads may miss each other's: an
-    /// addition at once takes as long as a node.
+    /// Counts nodes that a query has looked at, where they can lead to a sort. Threads may lose each other's counts: an atomic addition
+    /// takes as long as a node.
     #[inline(always)]
     fn note(&self, looked_at: u64) -> u64 {
         if self.sort_after.is_some() {
-            let before = self.looked_at.load(Ordering::Relaxed);
-            self.looked_at.store(before + looked_at, Ordering::Relaxed);
+            let before = self.looked_at.0.load(Ordering::Relaxed);
+            self.looked_at.0.store(before + looked_at, Ordering::Relaxed);
         }
         looked_at
     }

@@ -5,7 +5,7 @@ use super::node::{LANES, NONE, Node, extent_sum};
 use super::sort::{Entry, sort};
 use crate::Aabb;
 use crate::grid::{Simd, dispatch, prefetch};
-use crate::parallel::{SharedSlice, available_threads, run};
+use crate::parallel::{SharedSlice, alone, available_threads, run};
 use crate::policy::{PARALLEL_FROM_BOXES, index as policy};
 use std::sync::atomic::Ordering;
 
@@ -18,13 +18,13 @@ const READ_AHEAD: usize = 3;
 impl BoxIndex {
     /// Takes the boxes as they are now: `boxes` by id, [`Aabb::NOWHERE`] for an absent one. `changed` are the ids whose boxes
     /// may differ from those at the last call, in any order, repeated or not; without it any box may differ. Ids beyond the list have
-    /// no box.
+    /// no box. Shares the work of many boxes among rayon's threads.
     pub fn refresh(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
         self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
-        let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < self.listed;
+        let gone = boxes.len() as u32..self.known as u32;
+        let is_few = |changed: &&[u32]| (changed.len() + gone.len()) * policy::REFIT_SHARE < self.listed;
         match changed.filter(is_few) {
             Some(changed) => {
-                let gone = boxes.len() as u32..self.known as u32;
                 changed.iter().copied().chain(gone).for_each(|id| self.take(id, boxes));
             }
             None => self.refit(boxes),
@@ -34,6 +34,12 @@ impl BoxIndex {
         if self.wants_sort() || self.loose().len() > policy::loose_leaves(self.leaves) {
             self.lay_out(boxes, self.has_earned_sort().then_some(u32::MAX));
         }
+    }
+
+    /// As [`BoxIndex::refresh`], on the caller's thread alone: for a caller whose lock other tasks of rayon's threads wait for.
+    #[doc(hidden)]
+    pub fn refresh_alone(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
+        alone(|| self.refresh(boxes, changed));
     }
 
     /// Reads the changed boxes, for an owner that looks up each of them. Returns false if the boxes should be sorted before.
@@ -75,7 +81,7 @@ impl BoxIndex {
     /// [`BoxIndex::refresh`] sorts then, too.
     #[inline]
     pub fn wants_sort(&self) -> bool {
-        self.sort_after.is_some_and(|nodes| self.looked_at.load(Ordering::Relaxed) >= nodes)
+        self.sort_after.is_some_and(|nodes| self.looked_at.0.load(Ordering::Relaxed) >= nodes)
     }
 
     /// Chooses the number of nodes that queries look at before the next sort: as many as one sort costs if the order is bad, some
@@ -94,7 +100,7 @@ impl BoxIndex {
 
     /// Returns true if queries have looked at as many nodes as a sort costs.
     fn has_earned_sort(&self) -> bool {
-        self.looked_at.load(Ordering::Relaxed) >= policy::nodes_for_sort(self.leaves, self.listed)
+        self.looked_at.0.load(Ordering::Relaxed) >= policy::nodes_for_sort(self.leaves, self.listed)
     }
 
     /// Sorts the boxes as they are now.
@@ -124,11 +130,11 @@ impl BoxIndex {
     /// Reads the boxes of all leaves, then those of the other nodes, children first.
     fn read_all(&mut self, boxes: &[Aabb]) {
         let (leaves, end) = (self.leaves as usize, self.end as usize);
-        let workers = if self.known < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
+        let workers = if boxes.len() < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
         let (nodes, bounds) = (SharedSlice::new(&mut self.nodes), SharedSlice::new(&mut self.bounds));
         run(workers, leaves.div_ceil(PIECE), |_, piece| {
             let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
-            // SAFETY: pieces have different leaves.
+            // SAFETY: each number of a piece is given to one thread, pieces have different leaves, and leaves come first in both lists.
             let (nodes, bounds) = unsafe { (nodes.part(leaves.clone()), bounds.part(leaves)) };
             dispatch!(read, nodes, bounds, boxes);
         });
@@ -218,7 +224,7 @@ impl BoxIndex {
         self.extents = self.bounds.iter().map(extent_sum).collect();
         (self.grown, self.is_sorted) = (0, split.is_some());
         if self.is_sorted {
-            *self.looked_at.get_mut() = 0;
+            *self.looked_at.0.get_mut() = 0;
             self.has_moved = false;
         }
         self.plan_sort();

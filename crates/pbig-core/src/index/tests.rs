@@ -1,6 +1,7 @@
 //! The index gives the answers of a scan of all boxes, after all kinds of changes, and looks at few boxes.
 
-use super::BoxIndex;
+use super::query::Cast;
+use super::{BoxIndex, walk};
 use crate::grid::{Hits, Portable, Rule, Simd};
 use crate::{Aabb, Config, Engine, Finder, Pair, oracle};
 use rand::rngs::StdRng;
@@ -51,7 +52,37 @@ fn met(index: &BoxIndex, start: &Aabb, velocity: [f32; 3], max_time: f32) -> Vec
     found
 }
 
-/// Asks one question of each kind, and compares with a scan.
+/// Returns the ids that a walk visits.
+fn visited(walk: impl FnOnce(&mut dyn FnMut(u32)) -> u64) -> Vec<u32> {
+    let mut ids = vec![];
+    walk(&mut |id| ids.push(id));
+    ids
+}
+
+/// With portable instructions queries of each kind visit the same boxes in the same order as with the best ones.
+fn check_portable(index: &BoxIndex, start: &Aabb, velocity: [f32; 3], (time, within): (f32, f32)) {
+    // After a visit less is wanted.
+    let bounded = |visit: &mut dyn FnMut(u32), id: u32, bound: f32| {
+        visit(id);
+        0.5 * bound
+    };
+    let cast = Cast::new(start, velocity, time).expect("numbers");
+    assert_eq!(
+        visited(|visit| index.cast_aabb(start, velocity, time, |id| bounded(visit, id, time))),
+        visited(|visit| walk::cast(Portable, index, (cast, time), |id| bounded(visit, id, time))),
+    );
+    let point = start.min;
+    assert_eq!(
+        visited(|visit| index.near(point, within, |id| bounded(visit, id, within))),
+        visited(|visit| walk::near(Portable, index, (point, within), |id| bounded(visit, id, within))),
+    );
+    assert_eq!(
+        visited(|visit| index.overlapping(start, visit)),
+        visited(|visit| walk::overlapping(Portable, index, start, visit)),
+    );
+}
+
+/// Asks one query of each kind, and compares with a scan.
 fn check(index: &BoxIndex, boxes: &[Aabb], rng: &mut StdRng, reach: f32) {
     let start = Aabb::from_center(
         [0.0; 3].map(|_: f32| rng.random_range(-reach..reach)),
@@ -83,6 +114,7 @@ fn check(index: &BoxIndex, boxes: &[Aabb], rng: &mut StdRng, reach: f32) {
     });
     let is_near = |i: usize, factor: f64| distance(point, &boxes[i]) <= f64::from(within) * factor;
     compare(found, (0..boxes.len()).filter(|&i| is_near(i, 1.0)), |i| is_near(i, 1.001));
+    check_portable(index, &start, velocity, (max_time, within));
 }
 
 /// All wanted boxes were found, each once, and besides only such as `may_be`.
@@ -231,7 +263,7 @@ fn cast(index: &mut BoxIndex, boxes: &[Aabb], rays: usize) -> (u64, u64) {
 }
 
 #[test]
-fn a_crowd_of_questions_pays_for_a_sort_and_single_ones_do_not() {
+fn a_crowd_of_queries_pays_for_a_sort_and_single_ones_do_not() {
     for n in [1000, 10_000, 100_000] {
         let (boxes, mut index) = (scattered(n), BoxIndex::default());
         index.refresh(&boxes, None);
@@ -254,9 +286,9 @@ fn a_crowd_of_questions_pays_for_a_sort_and_single_ones_do_not() {
     }
 }
 
-/// Boxes that come after a sort make questions slow only until these have paid for the next one.
+/// Boxes that come after a sort make queries slow only until these have paid for the next one.
 #[test]
-fn later_boxes_are_sorted_in_once_questions_have_paid() {
+fn later_boxes_are_sorted_in_once_queries_have_paid() {
     for n in [2000, 20_000] {
         let (mut boxes, mut index) = (scattered(n), BoxIndex::default());
         index.refresh(&boxes, None);
@@ -274,7 +306,7 @@ fn later_boxes_are_sorted_in_once_questions_have_paid() {
 }
 
 #[test]
-fn questions_with_nans_visit_nothing() {
+fn queries_with_nans_visit_nothing() {
     let mut index = BoxIndex::default();
     let unit = Aabb::new([0.0; 3], [1.0; 3]);
     index.refresh(&[unit], None);
@@ -289,6 +321,11 @@ fn questions_with_nans_visit_nothing() {
     }
     for (point, distance) in [([f32::NAN; 3], 1.0), ([f32::NEG_INFINITY; 3], 1.0), ([0.5; 3], f32::NAN)] {
         assert_eq!(index.near(point, distance, |_| 1.0), 0);
+    }
+    // A box of a loose leaf, and the ends of a box in the wrong order.
+    index.refresh(&[unit, Aabb::new([0.0; 3], [9.0; 3])], Some(&[1]));
+    for invalid in [Aabb::new([6.0; 3], [4.0; 3]), Aabb { min: [f32::NAN; 3], ..unit }] {
+        assert_eq!(index.overlapping(&invalid, |id| panic!("box {id}")), 0);
     }
 }
 

@@ -43,6 +43,7 @@ struct Walk<'a, Q, V> {
     limit: f32,
     /// The first box whose visit returned 0, if the walk did not begin with 0. Of the boxes at 0 only those with lower ids are wanted.
     below: u32,
+    /// The walk began with 0: every box at 0 is wanted.
     is_overlap: bool,
     /// Nodes.
     looked_at: u64,
@@ -52,7 +53,7 @@ impl<'a, Q: Query, V: FnMut(u32) -> f32> Walk<'a, Q, V> {
     /// Makes a walk up to a time or distance.
     #[inline(always)]
     fn new(index: &'a BoxIndex, query: Q, bound: f32, visit: V) -> Self {
-        let limit = limit(&query, bound);
+        let limit = limit_of(&query, bound);
         Self { index, query, visit, limit, below: u32::MAX, is_overlap: bound <= 0.0, looked_at: 0 }
     }
 
@@ -99,13 +100,14 @@ impl<'a, Q: Query, V: FnMut(u32) -> f32> Walk<'a, Q, V> {
             if bound <= 0.0 && self.below == u32::MAX && !self.is_overlap {
                 self.below = id;
             }
-            self.limit = limit(&self.query, bound);
+            self.limit = limit_of(&self.query, bound);
         }
     }
 }
 
+/// Returns the value beyond which a query wants no boxes; negative if it wants none.
 #[inline(always)]
-fn limit(query: &impl Query, bound: f32) -> f32 {
+fn limit_of(query: &impl Query, bound: f32) -> f32 {
     if bound >= 0.0 { query.limit(bound.min(f32::MAX)) } else { -1.0 }
 }
 
@@ -120,8 +122,11 @@ fn push_all<T: Copy>(list: &mut ArrayVec<T, STACK>, numbers: &[T; LANES], count:
 /// Calls `visit` with the id of each box that overlaps one, and returns the number of nodes looked at.
 #[inline(always)]
 pub(super) fn overlapping(simd: impl Simd, index: &BoxIndex, aabb: &Aabb, mut visit: impl FnMut(u32)) -> u64 {
+    if !aabb.is_valid() {
+        return 0;
+    }
     let (mut looked_at, mut loose, mut waiting) = (0, index.loose(), ArrayVec::<u32, STACK>::new());
-    waiting.extend(index.root().filter(|_| aabb.is_valid()));
+    waiting.extend(index.root());
     while let Some(number) = loose.next().or_else(|| waiting.pop()) {
         looked_at += 1;
         let node = &index.nodes[number as usize];

@@ -5,29 +5,29 @@ use super::kept::{Kept, Rows};
 use super::row;
 use crate::Pair;
 use crate::grid::{Simd, dispatch};
-use crate::memory::Pool;
+use crate::memory::ShrinkingVec;
 use crate::parallel::SharedSlice;
 use std::ops::Range;
 
 /// The result of a comparison. `added` and `removed` are sorted.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Comparison {
-    pub(crate) added: Pool<Pair>,
-    pub(crate) removed: Pool<Pair>,
+    pub(crate) added: ShrinkingVec<Pair>,
+    pub(crate) removed: ShrinkingVec<Pair>,
     /// Kept pairs of removed boxes, which end without an event.
-    pub(crate) dropped: Pool<Pair>,
+    pub(crate) dropped: ShrinkingVec<Pair>,
     /// By group.
     parts: Vec<Part>,
     /// Buffers of a sort.
-    sorted: Pool<Pair>,
+    sorted: ShrinkingVec<Pair>,
     counts: Vec<u32>,
 }
 
 /// The events of one group.
 #[derive(Clone, Debug, Default)]
 struct Part {
-    added: Pool<Pair>,
-    removed: Pool<Pair>,
+    added: ShrinkingVec<Pair>,
+    removed: ShrinkingVec<Pair>,
 }
 
 impl Comparison {
@@ -70,7 +70,7 @@ impl Comparison {
     /// Gives back a piece of the memory that fewer events than before do not need. The last update had `events`.
     pub(crate) fn settle(&mut self, events: usize) {
         let parts = self.parts.iter_mut().flat_map(|part| [&mut part.added, &mut part.removed]);
-        parts.for_each(Pool::settle_and_clear);
+        parts.for_each(ShrinkingVec::settle_and_clear);
         let lists = [&mut self.added, &mut self.removed, &mut self.dropped, &mut self.sorted];
         lists.into_iter().for_each(|list| list.settle(events));
     }
@@ -92,6 +92,7 @@ impl Comparison {
 
     fn gather(&mut self) {
         self.clear();
+        // Not twice as much: after a peak these lists are the largest.
         self.added.reserve_exact(self.parts.iter().map(|part| part.added.len()).sum());
         self.removed.reserve_exact(self.parts.iter().map(|part| part.removed.len()).sum());
         for part in &self.parts {

@@ -4,7 +4,7 @@ use super::row::{self, SHORT};
 use crate::Pair;
 use crate::grid::{Hits, Simd, dispatch};
 use crate::id_set::IdSet;
-use crate::memory::Pool;
+use crate::memory::ShrinkingVec;
 use crate::parallel::{SharedSlice, ensure_scratch, run, run_with};
 use std::ops::{Range, RangeInclusive};
 
@@ -59,7 +59,7 @@ pub(crate) struct Groups {
     /// True if pairs may be there twice: those of a device that breaks its promise.
     pub(crate) may_repeat: bool,
     /// Pairs, group by group.
-    pairs: Pool<Pair>,
+    pairs: ShrinkingVec<Pair>,
     /// By group: its first pair; then the number of pairs.
     starts: Vec<u32>,
     /// By thread.
@@ -186,11 +186,11 @@ impl Groups {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sorter {
     spans: Vec<Span>,
-    others: Pool<u32>,
+    others: ShrinkingVec<u32>,
     /// The `a` of each pair, in order.
-    firsts: Pool<u32>,
+    firsts: ShrinkingVec<u32>,
     /// The `b` of each pair, by row, in no order within it.
-    unsorted: Pool<u32>,
+    unsorted: ShrinkingVec<u32>,
     /// Empty: for rows that are long.
     long: IdSet,
     /// Number of pairs of the largest group since memory was last given back.
@@ -225,7 +225,12 @@ fn sort_roughly(pairs: &[Pair], to: &mut Vec<Pair>, counts: &mut Vec<u32>, ids: 
 }
 
 /// Sorts pairs: roughly by `a` first if they are many.
-pub(super) fn sort(pairs: &mut Pool<Pair>, sorted: &mut Pool<Pair>, counts: &mut Vec<u32>, ids: usize) {
+pub(super) fn sort(
+    pairs: &mut ShrinkingVec<Pair>,
+    sorted: &mut ShrinkingVec<Pair>,
+    counts: &mut Vec<u32>,
+    ids: usize,
+) {
     let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
     if pairs.len() < 1 << RADIX_BITS {
         return pairs.sort_unstable_by_key(word);
@@ -321,11 +326,11 @@ mod tests {
 
     #[test]
     fn many_events_are_sorted_whatever_the_number_of_ids() {
-        let (mut sorted, mut counts) = (Pool::default(), vec![]);
+        let (mut sorted, mut counts) = (ShrinkingVec::default(), vec![]);
         for ids in [2047, 2048, 2049, (1 << 20) - 1, 1 << 20, (1 << 20) + 1] {
             for len in [0, 10, 2047, 2048, 5000] {
                 let id = |i: u64| (i * 0x9E37_79B9 % ids) as u32;
-                let mut pairs = Pool::default();
+                let mut pairs = ShrinkingVec::default();
                 pairs.extend((0..len).map(|i| Pair::new(id(i), id(i + len))));
                 pairs.push(Pair { a: ids as u32 - 2, b: ids as u32 - 1 });
                 let mut wanted = pairs.to_vec();

@@ -3,7 +3,7 @@
 use super::groups::Span;
 use crate::Pair;
 use crate::grid::prefetch;
-use crate::memory::{Pool, Scratch};
+use crate::memory::{Scratch, ShrinkingVec};
 use std::sync::OnceLock;
 
 /// Minimum room of a row that has outgrown its place.
@@ -23,7 +23,7 @@ const AHEAD: usize = 8;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
     pub(super) spans: Vec<Span>,
-    pub(super) pool: Pool<u32>,
+    pub(super) pool: ShrinkingVec<u32>,
 }
 
 impl Rows {
@@ -131,7 +131,7 @@ pub(crate) struct Kept {
     /// Buffers of the next comparison.
     pub(super) next: Scratch<Rows>,
     /// Changed pairs, `b` first.
-    turned: Scratch<Pool<Pair>>,
+    turned: Scratch<ShrinkingVec<Pair>>,
 }
 
 impl Kept {
@@ -184,7 +184,7 @@ impl Kept {
             span.start = next;
             next += len;
         }
-        let mut pool = Pool::default();
+        let mut pool = ShrinkingVec::default();
         pool.resize(next as usize, 0);
         for pair in self.iter() {
             let span = &mut spans[pair.b as usize];
@@ -268,11 +268,13 @@ impl Kept {
         self.turned.settle(events);
     }
 
-    /// Gives back memory that the kept pairs do not need.
-    pub(crate) fn shrink(&mut self) {
+    /// Gives back memory that the kept pairs do not need. No pair has an id of `ids` or more.
+    pub(crate) fn shrink(&mut self, ids: usize) {
         (self.next, self.turned) = Default::default();
         self.backward.take();
         self.forward.pool.shrink_to_fit();
+        self.forward.spans.truncate(ids);
+        self.lower.truncate(ids);
         self.forward.spans.shrink_to_fit();
         self.lower.shrink_to_fit();
     }

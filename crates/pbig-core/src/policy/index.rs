@@ -1,4 +1,4 @@
-//! Upkeep of the index for questions. A node is eight boxes; looking at one takes about 5 ns, sorting a box about 150.
+//! Upkeep of the index for queries. A node is eight boxes; looking at one takes about 5 ns, sorting a box about 150.
 
 /// Minimum share of changed boxes, as one in this number, for all boxes to be read in order. That takes about 3 ns a box; a box
 /// alone takes 50, because it updates its ancestors.
@@ -10,11 +10,11 @@ pub(crate) const GROWN_TO: f32 = 2.0;
 /// Minimum share of grown nodes, as one in this number, for the order to be bad.
 pub(crate) const GROWN_SHARE: usize = 8;
 
-/// Minimum work of questions, in sorts, before boxes are sorted although their order is not bad: such a sort adds at most an
+/// Minimum work of queries, in sorts, before boxes are sorted although their order is not bad: such a sort adds at most an
 /// eighth to the work.
 pub(crate) const SORTS_FOR_ORDER: u64 = 8;
 
-/// Returns the number of nodes that questions look at before a sort: it then takes about as long as they did. A sort looks at
+/// Returns the number of nodes that queries look at before a sort: it then takes about as long as they did. A sort looks at
 /// all ids, too.
 pub(crate) fn nodes_for_sort(leaves: u32, ids: usize) -> u64 {
     64 + 256 * u64::from(leaves) + ids as u64 / 4
@@ -23,7 +23,7 @@ pub(crate) fn nodes_for_sort(leaves: u32, ids: usize) -> u64 {
 /// Minimum share of the maximum number of leaves outside the tree, as one in this number, for the order to be bad.
 pub(crate) const FEW_LOOSE_SHARE: usize = 8;
 
-/// Returns the maximum number of leaves outside the tree, which every question looks at.
+/// Returns the maximum number of leaves outside the tree, which every query looks at.
 pub(crate) fn loose_leaves(leaves: u32) -> usize {
     8 + leaves as usize / 16
 }

@@ -8,6 +8,7 @@ use crate::Pair;
 use crate::broad_phase::world::{Old, World};
 use crate::grid::{Budget, Candidates, EditedGrid, Place, Record};
 use crate::holder::Holder;
+use crate::memory::ShrinkingVec;
 use crate::outcome::{End, Outcome};
 use crate::pairs::Comparison;
 use crate::parallel::{SharedSlice, available_threads, piece_range, run_with};
@@ -39,12 +40,19 @@ pub(crate) struct EditLimits {
 #[derive(Clone, Debug, Default)]
 struct Thread {
     candidates: Candidates,
-    added: Vec<Pair>,
-    removed: Vec<Pair>,
-    dropped: Vec<Pair>,
+    added: ShrinkingVec<Pair>,
+    removed: ShrinkingVec<Pair>,
+    dropped: ShrinkingVec<Pair>,
 }
 
 impl Edit {
+    /// Gives back memory that the events of the last run did not need.
+    pub(super) fn settle(&mut self) {
+        for Thread { added, removed, dropped, .. } in &mut self.threads {
+            [added, removed, dropped].into_iter().for_each(ShrinkingVec::settle_and_clear);
+        }
+    }
+
     /// Edits the grid, and leaves the events of an update in the task. Gives up if it takes too much work.
     pub(super) fn run(&mut self, task: &mut Task<'_>) -> Outcome {
         stage!("edit");

@@ -32,6 +32,7 @@ pub(super) struct Engines {
 impl Engines {
     /// Gives memory back if as many pairs are expected.
     pub(super) fn settle(&mut self, pairs: usize) {
+        self.edit.settle();
         self.rebuild.settle(pairs);
     }
 

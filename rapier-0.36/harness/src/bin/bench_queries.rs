@@ -1,5 +1,5 @@
 //! Prints the times of single scene queries, by rapier's own tree and by pbig in turn, as CSV:
-//! `cargo run --release --bin bench_questions -- --help`.
+//! `cargo run --release --bin bench_queries -- --help`.
 
 use clap::Parser;
 use glam::Vec3;
@@ -10,6 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rapier::math::DIM;
 use rapier::parry::query::ShapeCastOptions;
 use rapier::prelude::*;
+use std::num::NonZeroUsize;
 use std::time::Instant;
 
 /// Nanoseconds of a scene query in two equal worlds, one with rapier's own tree ("stock") and one with pbig, as CSV.
@@ -19,11 +20,11 @@ struct Args {
     #[arg(long, value_delimiter = ',', default_value = "30,100,300,1000,10000,100000")]
     bodies: Vec<usize>,
     /// Queries of a kind in a round.
-    #[arg(long, default_value_t = 2000)]
-    queries: usize,
+    #[arg(long, default_value = "2000")]
+    queries: NonZeroUsize,
     /// Rounds, the shortest of which counts. Moving worlds make a step before each.
-    #[arg(long, default_value_t = 14)]
-    rounds: usize,
+    #[arg(long, default_value = "14")]
+    rounds: NonZeroUsize,
     /// Only kinds of queries with a name that begins so.
     #[arg(long, default_value = "")]
     kind: String,
@@ -64,7 +65,7 @@ enum Kind {
 }
 
 /// A place, and a unit vector.
-type Question = (Vec3, Vec3);
+type Place = (Vec3, Vec3);
 
 /// A collider, and the time or distance at which it is met.
 type Answer = Option<(ColliderHandle, Real)>;
@@ -129,7 +130,7 @@ fn random_place(rng: &mut StdRng, reach: f32) -> Vec3 {
 }
 
 impl Kind {
-    fn question(self, rng: &mut StdRng, reach: f32) -> Question {
+    fn place(self, rng: &mut StdRng, reach: f32) -> Place {
         let along = random_place(rng, 1.0).normalize_or(Vec3::Y);
         let up = along.with_y(along.y.abs());
         match self {
@@ -142,7 +143,7 @@ impl Kind {
         }
     }
 
-    fn ask(self, queries: &QueryPipeline<'_>, (from, along): Question) -> Answer {
+    fn ask(self, queries: &QueryPipeline<'_>, (from, along): Place) -> Answer {
         let (from, along) = (to_vector(from), to_vector(along));
         match self {
             Self::RayIn | Self::RayPast | Self::RayInside => {
@@ -181,29 +182,29 @@ impl Both {
         self.0.iter_mut().for_each(|(world, broad_phase)| world.step(broad_phase));
     }
 
-    fn ask(&self, side: usize, kind: Kind, questions: &[Question]) -> (f64, Vec<Answer>) {
+    fn ask(&self, side: usize, kind: Kind, places: &[Place]) -> (f64, Vec<Answer>) {
         let (World { bodies, colliders, narrow_phase, .. }, broad_phase) = &self.0[side];
         let (dispatcher, filter) = (narrow_phase.query_dispatcher(), QueryFilter::default());
         let clock = Instant::now();
         let queries = broad_phase.as_query_pipeline(dispatcher, bodies, colliders, filter);
-        let answers = questions.iter().map(|question| kind.ask(&queries, *question)).collect();
-        (clock.elapsed().as_nanos() as f64 / questions.len() as f64, answers)
+        let answers = places.iter().map(|place| kind.ask(&queries, *place)).collect();
+        (clock.elapsed().as_nanos() as f64 / places.len() as f64, answers)
     }
 
     /// Returns the least times of some rounds, of stock and of pbig. Both have the same hits.
     fn measure(&mut self, args: &Args, subject: &Subject, kind: Kind) -> [Times; 2] {
         let mut rng = StdRng::seed_from_u64(1);
-        let questions: Vec<Question> =
-            (0..args.queries).map(|_| kind.question(&mut rng, subject.reach())).collect();
+        let places: Vec<Place> =
+            (0..args.queries.get()).map(|_| kind.place(&mut rng, subject.reach())).collect();
         let mut least = [[f64::INFINITY; 2]; 2];
-        for round in 0..args.rounds {
+        for round in 0..args.rounds.get() {
             if subject.moves {
                 self.step();
             }
             let mut answers = [vec![], vec![]];
             for side in if round % 2 == 0 { [0, 1] } else { [1, 0] } {
-                let first = self.ask(side, kind, &questions[..1]).0;
-                let (each, found) = self.ask(side, kind, &questions);
+                let first = self.ask(side, kind, &places[..1]).0;
+                let (each, found) = self.ask(side, kind, &places);
                 answers[side] = found;
                 least[side] = [least[side][0].min(each), least[side][1].min(first)];
             }
