@@ -19,7 +19,7 @@ pub fn run(quick: bool) -> Result<BenchReport, Failure> {
         for &n in sizes {
             let boxes = recipe.boxes(n, 1);
             let (mut finder, ms) = search(&boxes, None)?;
-            let grid = if n == SIZES[0] { Some(search(&boxes, Some(Engine::Rebuild))?.1) } else { None };
+            let grid = if n == SIZES[0] { Some(search(&boxes, Some(Engine::Grid))?.1) } else { None };
             let pairs = finder.find(&boxes)?.len();
             let report = finder.report();
             let work = report.work as f64 / (n + pairs) as f64;

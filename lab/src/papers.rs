@@ -19,7 +19,7 @@ use pbig_harness::prelude::*;
 use sides::Setup;
 
 /// Our grid on the CPU, however few the boxes.
-const OUR_GRID: Config = Config { engine: Some(Engine::Rebuild), ..UNSORTED };
+const OUR_GRID: Config = Config { engine: Some(Engine::Grid), ..UNSORTED };
 
 type Section = fn(&Setup) -> Result<Vec<Table>, Failure>;
 

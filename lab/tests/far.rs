@@ -93,7 +93,7 @@ fn far_away_two_ulps_of_margin_miss_nothing_the_default_does() {
         let crowd = Crowd::new(offset, 3000);
         pairs += crowd.pairs.len();
         without += crowd.missed(&mut PbigBroadPhase::new());
-        for engine in [None, Some(Engine::Rebuild)] {
+        for engine in [None, Some(Engine::Grid)] {
             let margin = 1.01 * offset as f32 / (1 << 22) as f32;
             let config = Config { backend: Backend::Cpu, engine, margin, ..PbigConfig::DEFAULT.into() };
             let mut ours = PbigBroadPhase::with_core_config(config).expect("a length");

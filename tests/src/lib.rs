@@ -135,7 +135,7 @@ pub fn strategies() -> Vec<(&'static str, Way)> {
 
 /// The CPU's grid, however few the boxes.
 pub fn grid() -> Config {
-    Config { backend: Backend::Cpu, engine: Some(Engine::Rebuild), ..Config::DEFAULT }
+    Config { backend: Backend::Cpu, engine: Some(Engine::Grid), ..Config::DEFAULT }
 }
 
 /// The CPU's engines for updates where the policy would not choose them, by name.

@@ -87,7 +87,7 @@ fn two_half_infinite_boxes_leave_a_tree_as_it_is() {
 #[test]
 fn a_grid_alone_breaks_the_bound() {
     let (_, recipe) = shapes().into_iter().find(|(name, _)| *name == "two scales").expect("a shape");
-    let [small, large] = SIZES.map(|n| search(&recipe.boxes(n, 1), Some(Engine::Rebuild)));
+    let [small, large] = SIZES.map(|n| search(&recipe.boxes(n, 1), Some(Engine::Grid)));
     assert!(large > MAX_GROWTH * small && large > WORK_LIMIT as f64, "{small}, {large}");
 }
 
@@ -199,11 +199,13 @@ fn clusters_far_apart_take_no_more_work_than_their_crowds() {
             let at = [place % 10, place / 10 % 10, place / 100].map(|x| x as f32 + town + by);
             pbig_core::Aabb::from_center(at, [0.45; 3])
         };
-        // A grid alone, because a tree would take over.
-        let config = Config { engine: Some(Engine::Edit), ..Config::DEFAULT };
-        let mut broad_phase = BroadPhase::new(config).expect("a margin");
-        // Work for each changed box and each box at its place: if all change, and if few do, which are looked up.
-        for (step, by, most) in [(1, 0.0, 16.0), (50, 0.2, 250.0)] {
+        // Work for each changed box and each box at its place: if all change (in a grid alone, because a tree would take over), and if
+        // few do, which are looked up.
+        for (engine, step, by, most) in [(Engine::Grid, 1, 0.0, 16.0), (Engine::LookUp, 50, 0.2, 250.0)] {
+            let config = Config { engine: Some(engine), ..Config::DEFAULT };
+            let mut broad_phase = BroadPhase::new(config).expect("a margin");
+            (0..2000 * crowd).for_each(|id| broad_phase.set(id, cube(id, 0.1), filter).expect("an id"));
+            broad_phase.update().expect("few pairs");
             let changed = (0..2000 * crowd).step_by(step);
             changed.clone().for_each(|id| broad_phase.set(id, cube(id, by), filter).expect("an id"));
             broad_phase.update().expect("few pairs");

@@ -15,8 +15,8 @@ pub(crate) struct Checked {
     pub(crate) way: Way,
 }
 
-/// The backends on which rapier's semantics are tested: the CPU as it comes, which sweeps a small world,
-/// the CPU with its grid and a GPU with its grid, however small the world.
+/// The backends on which rapier's semantics are tested: the CPU as it comes, which tests all pairs of a small world or looks boxes
+/// up, the CPU with its grid and a GPU with its grid, however small the world.
 pub(crate) fn backends() -> Vec<(&'static str, Way)> {
     let [cpu, grid] = on_cpu().map(Way::from);
     let all = [("cpu", cpu), ("cpu grid", grid), ("gpu", on_gpu())];
@@ -40,7 +40,7 @@ pub(crate) fn on_its_device(way: Way, mut pbig: PbigBroadPhase) -> PbigBroadPhas
 /// As it comes, and with its grid.
 pub(crate) fn on_cpu() -> [Config; 2] {
     let cpu = Config { backend: Backend::Cpu, ..PbigConfig::DEFAULT.into() };
-    [cpu, Config { engine: Some(Engine::Rebuild), ..cpu }]
+    [cpu, Config { engine: Some(Engine::Grid), ..cpu }]
 }
 
 /// With its grid.

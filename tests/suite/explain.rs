@@ -172,7 +172,7 @@ fn each_stage_is_a_span() {
     let on_cpu = Config { backend: Backend::Cpu, ..PbigConfig::DEFAULT.into() };
     // A small world is swept, but for its first update.
     assert!(spans(on_cpu).is_superset(&["update", "proxies", "check", "events"].into()));
-    let by_grid = spans(Config { engine: Some(Engine::Rebuild), ..on_cpu });
+    let by_grid = spans(Config { engine: Some(Engine::Grid), ..on_cpu });
     assert_eq!(by_grid, ["update", "proxies", "plan", "map", "check", "diff", "events"].into());
     needs_gpu!();
     let of_gpu = spans(Config { backend: Backend::Device, ..PbigConfig::DEFAULT.into() });
@@ -199,7 +199,7 @@ impl DebugRenderBackend for Canvas {
 #[test]
 fn boxes_and_cells_are_drawn_with_twelve_lines_each() {
     let config =
-        Config { engine: Some(Engine::Rebuild), backend: Backend::Cpu, ..PbigConfig::DEFAULT.into() };
+        Config { engine: Some(Engine::Grid), backend: Backend::Cpu, ..PbigConfig::DEFAULT.into() };
     let mut world = World::with_gravity(glam::Vec3::ZERO);
     for i in 0..64 {
         let at = glam::vec3((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32) * 5.0;

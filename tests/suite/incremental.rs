@@ -109,7 +109,7 @@ fn an_update_that_finds_too_many_pairs_can_be_repeated() {
         set_all(&mut broad_phase, &boxes);
         broad_phase.update().expect("within the limits");
         let before: Vec<Pair> = broad_phase.pairs().collect();
-        // Few changes: an edit may find too many, too.
+        // Few changes: look-ups may find too many, too.
         [3, 4].into_iter().for_each(|id| broad_phase.set(id, all, ProxyFilter::ALL).expect("a small id"));
         assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 250 }));
         assert!(broad_phase.pairs().eq(before), "nothing has changed");

@@ -8,7 +8,7 @@ mod checked;
 mod differences;
 mod documents;
 mod drop_in;
-mod edits;
+mod look_ups;
 mod explain;
 mod finder;
 mod follower;

@@ -1,13 +1,13 @@
 //! The colliders of a world by handle, their boxes in the core, and the events for the narrow phase.
 
 use crate::events::{EventWriter, PairEvent, handles};
-use crate::index::{SceneIndex, SceneQuery};
+use crate::scene_query::SceneQuery;
 use crate::order::PairOrder;
 use crate::registry::ColliderRegistry;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
 use crate::{Bounds, BoxStore, Handle, HandlePair, Margins, Scene, Tree};
-use pbig_core::{Aabb, BroadPhase, Error, PairDevice, ProxyFilter};
+use pbig_core::{BroadPhase, Error, PairDevice, ProxyFilter};
 use std::collections::HashSet;
 
 /// The numbers of a world.
@@ -32,7 +32,6 @@ pub struct Colliders<T: Tree> {
     /// Proxies that several threads compute. Kept for its memory.
     #[cfg(feature = "parallel")]
     pub(crate) proxies: Vec<(Handle, crate::Proxy<T::Aabb>)>,
-    index: SceneIndex,
     tree: SceneTree<T>,
     pub(crate) counts: Counts,
     last_error: Option<Error>,
@@ -56,7 +55,6 @@ impl<T: Tree> Colliders<T> {
             margins: Margins::default(),
             #[cfg(feature = "parallel")]
             proxies: Vec::new(),
-            index: SceneIndex::default(),
             tree: SceneTree::default(),
             counts: Counts::default(),
             last_error: None,
@@ -110,7 +108,6 @@ impl<T: Tree> Colliders<T> {
             }
         }
         if !self.boxes.changes(&self.core).is_empty() {
-            self.index.expire();
             self.tree.expire();
         }
     }
@@ -125,12 +122,12 @@ impl<T: Tree> Colliders<T> {
                 let (start, velocity) = boxes.narrow_motion(start, velocity);
                 let time = boxes.narrow_bound(*time);
                 let visit = |id| boxes.narrow_bound(visit(id));
-                self.index.ask(&self.core, |index| index.cast_aabb(&start, velocity, time, visit));
+                self.core.index().cast_aabb(&start, velocity, time, visit);
             }
             SceneQuery::Near(point, distance) => {
                 let (point, distance) = (boxes.narrow_point(point), boxes.narrow_bound(*distance));
                 let visit = |id| boxes.narrow_bound(visit(id));
-                self.index.ask(&self.core, |index| index.near(point, distance, visit));
+                self.core.index().near(point, distance, visit);
             }
             SceneQuery::Overlap(aabb) => {
                 let visit = |id| {
@@ -138,16 +135,8 @@ impl<T: Tree> Colliders<T> {
                         visit(id);
                     }
                 };
-                self.overlapping(&boxes.narrow_box(aabb), visit);
+                self.core.index().overlapping(&boxes.narrow_box(aabb), visit);
             }
-        }
-    }
-
-    /// Visits the boxes that overlap one, in the grid if there is one of just these boxes, as in the middle of a step, when
-    /// continuous collision detection asks.
-    fn overlapping(&self, aabb: &Aabb, mut visit: impl FnMut(u32)) {
-        if !(self.index.prefers_grid() && self.core.overlapping_in_grid(aabb, &mut visit)) {
-            self.index.ask(&self.core, |index| index.overlapping(aabb, visit));
         }
     }
 
@@ -172,11 +161,8 @@ impl<T: Tree> Colliders<T> {
         self.counts = Counts { modified, removed, totals, ..Counts::default() };
         (self.last_error, self.is_idle) = (None, false);
         // A shape may panic in the middle.
-        self.index.expire();
         self.tree.expire();
         self.read(scene, margins);
-        self.index.note(self.core.changes(), self.core.id_count());
-        self.index.prepare(&self.core);
         self.tree.note(self.boxes.changes(&self.core).iter().copied(), self.registry.len());
         self.find_and_send(|handle| scene.size(handle), send);
         self.counts.totals.failures += u64::from(self.last_error.is_some());
@@ -267,7 +253,7 @@ impl<T: Tree> Colliders<T> {
     fn forget_all(&mut self) {
         self.registry.clear();
         self.boxes.clear(&mut self.core);
-        (self.index, self.tree) = (SceneIndex::default(), SceneTree::default());
+        self.tree = SceneTree::default();
         self.writer.order = PairOrder::default();
     }
 

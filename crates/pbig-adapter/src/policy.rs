@@ -15,10 +15,6 @@ pub(crate) const PROXIES_PER_BATCH: usize = 16_384;
 #[cfg(feature = "parallel")]
 pub(crate) const PROXIES_PER_PIECE: usize = 512;
 
-/// Queries about boxes that a grid answers after a change, before the index for queries is brought up to date: continuous
-/// collision detection asks a few in each step.
-pub(crate) const QUERIES_TO_GRID: u32 = 16;
-
 /// Changes since the last scene query, per collider, beyond which the tree for queries is dropped. A rebuild then costs
 /// little more than an update, and perhaps there are no more queries.
 pub(crate) const TREE_CHANGES_PER_COLLIDER: usize = 1;

@@ -13,15 +13,13 @@ pub enum Algorithm {
     Nothing,
     /// Every pair was tested.
     Brute,
-    /// Changed boxes were tested against all, and what they overlap was compared with their kept pairs.
-    Sweep,
     /// All boxes were sorted into a grid and searched.
     Grid,
-    /// Changed boxes were moved in the grid of an earlier update, and only they were searched for.
-    Edit,
     /// All boxes were sorted into a tree, as cells would hold too many, and paired by it, or by streamed segment trees where they
-    /// cross; or changed boxes were searched for in one.
+    /// cross.
     Tree,
+    /// Changed boxes were looked up in a tree, and what they overlap was compared with their kept pairs.
+    LookUp,
     /// A device did the work, see [`crate::PairDevice`].
     Device,
 }
@@ -32,10 +30,9 @@ impl Algorithm {
         match self {
             Self::Nothing => "nothing",
             Self::Brute => "brute",
-            Self::Sweep => "sweep",
             Self::Grid => "grid",
-            Self::Edit => "edit",
             Self::Tree => "tree",
+            Self::LookUp => "look-up",
             Self::Device => "device",
         }
     }
@@ -60,7 +57,7 @@ pub struct Plan {
     pub boxes: u32,
     /// Lower corner of the first cell, in the boxes' length unit.
     pub origin: [f64; 3],
-    /// Edges of a cell, in the boxes' length unit ([`Algorithm::Grid`] and [`Algorithm::Edit`]).
+    /// Edges of a cell, in the boxes' length unit ([`Algorithm::Grid`]).
     pub cell: [f32; 3],
     /// Cells by axis.
     pub dims: [u32; 3],
@@ -68,8 +65,6 @@ pub struct Plan {
     pub scan: NeighbourScan,
     /// Boxes larger than a cell, tested against all boxes that they reach.
     pub oversize: u32,
-    /// Boxes that are not in the grid's order, because they moved since it was built ([`Algorithm::Edit`]).
-    pub spilled: u32,
     /// The device's plan in words ([`Algorithm::Device`]); none where every pair was tested.
     pub device: Option<String>,
     /// The reason that kept a call from a device.
@@ -111,20 +106,15 @@ impl fmt::Display for Plan {
             Algorithm::Nothing if boxes < 2 => write!(f, "nothing to do: fewer than two boxes can meet")?,
             Algorithm::Nothing => write!(f, "nothing to do: no box has changed")?,
             Algorithm::Brute => write!(f, "brute force: every pair of {boxes} boxes is tested")?,
-            Algorithm::Sweep => write!(f, "sweep: changed boxes are tested against all {boxes}")?,
-            Algorithm::Tree => {
-                write!(f, "tree: cells would hold too many of {boxes} boxes, or few have changed")?
-            }
+            Algorithm::Tree => write!(f, "tree: cells would hold too many of {boxes} boxes")?,
+            Algorithm::LookUp => write!(f, "look-up: few of {boxes} boxes have changed")?,
             Algorithm::Device => match &self.device {
                 Some(plan) => write!(f, "device: {boxes} boxes; {plan}")?,
                 None => write!(f, "device: {boxes} boxes, every pair is tested")?,
             },
             Algorithm::Grid => write!(f, "grid: {boxes} boxes are sorted and searched")?,
-            Algorithm::Edit => {
-                write!(f, "edit: {} of {boxes} boxes are out of the grid's order", self.spilled)?
-            }
         }
-        if matches!(self.algorithm, Algorithm::Grid | Algorithm::Edit) {
+        if self.algorithm == Algorithm::Grid {
             self.write_cells(f)?;
         }
         // Where no device was given nobody expects one.
@@ -141,8 +131,8 @@ mod tests {
 
     #[test]
     fn every_algorithm_says_why_no_device_was_used() {
-        use Algorithm::{Brute, Edit, Grid, Nothing, Sweep, Tree};
-        for algorithm in [Nothing, Brute, Sweep, Grid, Edit, Tree] {
+        use Algorithm::{Brute, Grid, LookUp, Nothing, Tree};
+        for algorithm in [Nothing, Brute, Grid, Tree, LookUp] {
             let shown = |no_device| Plan { algorithm, boxes: 9, no_device, ..Plan::default() }.to_string();
             assert!(shown(Some(NoDevice::Software)).ends_with("; no device: the given one is software"));
             assert_eq!(shown(Some(NoDevice::NotGiven)), shown(None));

@@ -2,12 +2,11 @@
 //! pair of a few.
 
 use crate::grid::{
-    ById, EditedGrid, GridPlan, Hits, Receiver, Rule, Sorted, TwoGrids, brute_force, brute_force_across,
+    ById, Grid, GridPlan, Hits, Receiver, Rule, Sorted, TwoGrids, brute_force, brute_force_across,
 };
 use crate::device_slot::DeviceSlot;
-use crate::holder::Holder;
 use crate::index::BoxIndex;
-use crate::memory::{Pool, Scratch};
+use crate::memory::{Scratch, ShrinkingVec};
 use crate::outcome::{End, Outcome};
 use crate::pairs::{Grouping, Groups};
 use crate::parallel::{available_threads, piece_range, run_with};
@@ -74,36 +73,25 @@ impl<'a> Request<'a> {
         let smaller = self.others.map(|others| others.len().min(self.boxes.len()));
         let is_few = self.count() <= policy::BRUTE_FORCE_UP_TO_BOXES
             || smaller.is_some_and(|few| few <= policy::FEW_BOXES);
-        let may_be_brute = self.config.engine.is_none() || smaller == Some(0);
+        let may_be_brute = matches!(self.config.engine, None | Some(Engine::LookUp)) || smaller == Some(0);
         self.config.backend == Backend::Brute || may_be_brute && is_few
     }
 }
 
-/// The structures that can hold the boxes of a search.
+/// The structures that hold the boxes of a search.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Store {
-    pub(crate) grid: EditedGrid,
+    grid: Scratch<Grid>,
     two_grids: Scratch<TwoGrids>,
     pub(crate) tree: BoxIndex,
     /// Both sets in one list, for a tree.
     both_sets: Scratch<Vec<Aabb>>,
-    /// Tests of the last search that was done.
-    pub(crate) work: u64,
 }
 
 impl Store {
     /// Gives back memory that the boxes of the last search did not need.
-    pub(crate) fn settle(&mut self, holder: Holder) {
-        self.grid.settle(holder == Holder::Grid);
-    }
-
-    /// Renames the boxes that a search has left: `names[id]` is the new id of the box `id`.
-    pub(crate) fn rename(&mut self, holder: Holder, names: &[u32]) {
-        match holder {
-            Holder::Grid => self.grid.rename(names),
-            Holder::Tree => self.tree.rename(names),
-            Holder::Nothing | Holder::Lanes => {}
-        }
+    pub(crate) fn settle(&mut self) {
+        self.grid.settle();
     }
 }
 
@@ -112,7 +100,7 @@ impl Store {
 pub(crate) struct AllPairs {
     pub(crate) hits: Vec<Hits>,
     /// Memory for the answer of a device.
-    answer: Pool<Pair>,
+    answer: ShrinkingVec<Pair>,
 }
 
 impl AllPairs {
@@ -132,11 +120,7 @@ impl AllPairs {
         } else {
             self.search(request, store, &rule, &mut outcome);
         }
-        let outcome = self.finish(&rule, outcome);
-        if outcome.end == End::Done {
-            store.work = outcome.checks.made;
-        }
-        outcome
+        self.finish(&rule, outcome)
     }
 
     /// Hands the last pairs to the receiver, and returns the outcome with its counts.
@@ -149,7 +133,7 @@ impl AllPairs {
         outcome.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
         outcome.work = made + sum(|hits| hits.runs);
         if self.hits.iter().any(Hits::is_full) || self.count() > rule.max_pairs {
-            return Outcome { end: End::TooManyPairs, holder: Holder::Nothing, ..outcome };
+            return Outcome { end: End::TooManyPairs, ..outcome };
         }
         Outcome { end: End::Done, ..outcome }
     }
@@ -200,7 +184,6 @@ impl AllPairs {
             sorted.search(rule, &mut self.hits);
         }
         outcome.stages.check += clock.lap();
-        outcome.holder = Holder::Grid;
         outcome.plan = Plan::of_grid(&plan, sorted.boxes(), sorted.oversize_count());
         if !is_grid {
             self.search_tree(request, (tree, both_sets), rule, outcome);
@@ -209,8 +192,10 @@ impl AllPairs {
 
     /// Returns true if a grid finds the pairs with less work than a tree.
     fn is_for_grid(&mut self, request: &Request<'_>, sorted: &Sorted<'_>) -> bool {
-        if let Some(engine) = request.config.engine {
-            return engine != Engine::Tree;
+        match request.config.engine {
+            Some(Engine::Grid) => return true,
+            Some(Engine::Tree) => return false,
+            Some(Engine::LookUp) | None => {}
         }
         let (boxes, work) = (sorted.boxes(), sorted.work(self.hits.len()));
         if search::is_light(boxes, work) {
@@ -251,7 +236,6 @@ impl AllPairs {
             }
         }
         outcome.stages.check += clock.lap();
-        outcome.holder = Holder::Tree;
         outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: outcome.plan.boxes, ..Plan::default() };
     }
 

@@ -93,31 +93,28 @@ impl Default for Config {
     }
 }
 
-/// The ways in which the CPU makes an update of [`crate::BroadPhase`].
+/// The ways in which the CPU makes an update of [`crate::BroadPhase`], or a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[doc(hidden)]
 pub enum Engine {
-    /// Changed boxes are tested against all.
-    Sweep,
-    /// Changed boxes are moved in the grid and searched for. Without a grid, or where that takes too much work, it is a rebuild.
-    Edit,
-    /// Changed boxes are looked up in a tree, into which all are sorted at first. A search joins the tree with itself.
+    /// An update looks up the changed boxes, however many.
+    LookUp,
+    /// All boxes are searched for by a grid.
+    Grid,
+    /// All boxes are sorted into a tree, which is joined with itself.
     Tree,
-    /// All boxes are sorted into a grid, or a tree where cells would hold too many, searched and compared.
-    Rebuild,
 }
 
 impl Engine {
     /// All engines, for tests.
-    pub const ALL: [Self; 4] = [Self::Sweep, Self::Edit, Self::Tree, Self::Rebuild];
+    pub const ALL: [Self; 3] = [Self::LookUp, Self::Grid, Self::Tree];
 
     /// Returns the name in messages of tests.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Sweep => "sweep",
-            Self::Edit => "edit",
+            Self::LookUp => "look-up",
+            Self::Grid => "grid",
             Self::Tree => "tree",
-            Self::Rebuild => "rebuild",
         }
     }
 }

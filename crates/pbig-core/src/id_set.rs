@@ -68,7 +68,7 @@ impl IdSet {
     }
 
     /// Yields the members in order.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = u32> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = u32> + Clone {
         let words = self.words.iter().enumerate().flat_map(|(at, word)| ones(at, *word));
         words.flat_map(|word| ones(word as usize, self.bits[word as usize]))
     }
@@ -82,7 +82,7 @@ impl IdSet {
 
 /// Yields the numbers of the bits of the word `at` of many.
 #[inline(always)]
-fn ones(at: usize, mut word: u64) -> impl Iterator<Item = u32> {
+fn ones(at: usize, mut word: u64) -> impl Iterator<Item = u32> + Clone {
     std::iter::from_fn(move || {
         let bit = word.trailing_zeros();
         let is_any = word != 0;

@@ -1,7 +1,6 @@
 //! The outcome of an engine or a search of all boxes, and how a report takes it.
 
 use crate::Plan;
-use crate::holder::Holder;
 use crate::report::{Checks, DeviceReport, Report, StageTimes};
 use crate::{Config, Error};
 
@@ -20,7 +19,6 @@ pub(crate) enum End {
 #[derive(Debug, Default)]
 pub(crate) struct Outcome {
     pub(crate) end: End,
-    pub(crate) holder: Holder,
     pub(crate) checks: Checks,
     pub(crate) work: u64,
     pub(crate) plan: Plan,

@@ -25,7 +25,7 @@ impl Falling {
 
 fn small_and_grid() -> [Config; 2] {
     let base = Config { backend: Backend::Cpu, margin: 0.01, ..Config::DEFAULT };
-    [base, Config { engine: Some(Engine::Rebuild), ..base }]
+    [base, Config { engine: Some(Engine::Grid), ..base }]
 }
 
 #[test]
@@ -39,7 +39,7 @@ fn free_fall_for_a_million_steps_at_the_same_cost_and_memory() {
         assert!(depth < -1e9, "fell to {depth}");
         assert!(cost.late <= cost.early * 5 / 4, "{cost:?}: deep down it costs more");
         assert!(cost.early > 0 && cost.late > 0, "{cost:?}: brute force took over");
-        // A sweep tests each of 200 boxes against all, wherever they are.
+        // Brute force tests each of 200 boxes against all, wherever they are.
         let most = if config.engine.is_none() { 200 * 200 } else { 30 * 200 };
         assert!(cost.most <= most, "{cost:?} in an update of 200 boxes");
     }

@@ -162,20 +162,20 @@ fn cpu(engine: Option<Engine>) -> Config {
 }
 
 #[test]
-fn soak_of_a_small_world_that_is_swept() {
+fn soak_of_a_small_world() {
     let tally = soak(|| Churn::new(cpu(None), 400), updates());
-    tally.assert_mostly(&["sweep"], 90);
+    tally.assert_mostly(&["brute", "look-up"], 90);
 }
 
 #[test]
-fn soak_of_a_world_in_the_grid_with_edits() {
+fn soak_of_a_world_with_look_ups() {
     let churn = || Churn { one_in: 50, ..Churn::new(cpu(None), 10_000) };
-    soak(churn, updates()).assert_mostly(&["edit"], 95);
+    soak(churn, updates()).assert_mostly(&["look-up"], 95);
 }
 
 #[test]
 fn soak_of_a_small_world_in_the_grid() {
-    let tally = soak(|| Churn::new(cpu(Some(Engine::Rebuild)), 120), updates());
+    let tally = soak(|| Churn::new(cpu(Some(Engine::Grid)), 120), updates());
     tally.assert_mostly(&["grid"], 90);
 }
 
@@ -185,7 +185,7 @@ fn soak_on_threads() {
     let churn = || Churn { one_in: 8, ..Churn::new(cpu(None), 20_000) };
     let updates = (updates() / 30).max(40);
     let tally = soak_on(3, churn, updates, (updates / 20).clamp(4, 500));
-    tally.assert_mostly(&["edit", "grid"], 95);
+    tally.assert_mostly(&["look-up", "grid"], 95);
 }
 
 /// A software adapter takes milliseconds for an update: a hundredth of them.

@@ -1,29 +1,31 @@
 //! The incremental form: boxes are set and removed by id, an update tells which pairs were added and removed.
 //!
 //! ```text
-//! set, remove ─► world ─► policy ─► sweep, edit, look up in a tree, or rebuild and compare ─► kept pairs ─► events
+//! set, remove ─► world ─► few changed:  look them up in the tree, compare partners ─► events ─► kept pairs
+//!                    └──► many changed: search all boxes, compare rows of pairs ─► events, kept pairs
 //! ```
 
-mod engines;
+mod look_up;
 mod query;
+mod search;
 #[cfg(feature = "serde")]
 mod snapshot;
 #[cfg(test)]
 mod tests;
+mod tree;
 mod update;
 mod world;
 
-use crate::all_pairs::Store;
 use crate::device_slot::DeviceSlot;
 use crate::finder::check_count;
 use crate::grid::prefetch;
-use crate::holder::Holder;
 use crate::memory::Scratch;
 use crate::pairs::{Comparison, Kept};
 use crate::policy;
 use crate::report::Report;
 use crate::{Aabb, Backend, Config, Error, Limits, Pair, PairDevice, ProxyFilter};
-use engines::Engines;
+use look_up::LookUp;
+use search::Search;
 use world::World;
 
 /// Number of boxes between a prefetch and the use of its box.
@@ -48,10 +50,10 @@ pub struct Events {
 /// of its sides, nothing has changed and nothing is done. Ids should be dense: each id up to the largest takes 64 bytes, used or
 /// not. The grid and the pairs come on top.
 ///
-/// An update in which few boxes have changed tests only these. An update in which many have changed sorts all boxes into a
-/// grid (or a tree, where a cell would hold too many), searches it, and compares the pairs with those of the last update. After a
-/// peak it takes time for the boxes that are left. Memory for pairs, events and the grid comes back by itself, a piece an update; that
-/// for ids and trees by [`BroadPhase::shrink_to_fit`].
+/// An update in which few boxes have changed looks up only these, in a tree of all boxes. An update in which many have changed
+/// searches all boxes, and compares the pairs with those of the last update. After a peak it takes time for the boxes that are left.
+/// Memory for pairs, events and grids comes back by itself, a piece an update; that for ids and trees by
+/// [`BroadPhase::shrink_to_fit`].
 ///
 /// ```
 /// use pbig_core::{Aabb, BroadPhase, Config, Pair, ProxyFilter};
@@ -69,17 +71,22 @@ pub struct BroadPhase {
     config: Config,
     device: DeviceSlot,
     world: World,
-    /// The structure that holds the boxes of the last update.
-    holder: Holder,
-    store: Store,
-    /// Pairs that began or ended in the last update.
-    last_events: usize,
     given_up: policy::GivenUp,
-    engines: Engines,
+    look_up: Scratch<LookUp>,
+    search: Scratch<Search>,
     comparison: Scratch<Comparison>,
     kept: Kept,
     events: Events,
     report: Report,
+}
+
+/// An update: what it reads, and where it leaves the events.
+struct Task<'a> {
+    world: &'a World,
+    config: &'a Config,
+    kept: &'a mut Kept,
+    /// The events. Cleared first, and left sorted.
+    events: &'a mut Comparison,
 }
 
 impl BroadPhase {
@@ -89,9 +96,7 @@ impl BroadPhase {
     /// [`Error::Margin`].
     pub fn new(config: Config) -> Result<Self, Error> {
         check_margin(config.margin)?;
-        let mut broad_phase = Self { config, ..Self::default() };
-        broad_phase.world.keep_old = broad_phase.old_to_keep();
-        Ok(broad_phase)
+        Ok(Self { config, ..Self::default() })
     }
 
     /// Makes a broad phase with a given device, which [`Backend::Device`] uses. [`Backend::Auto`] leaves updates to the CPU.
@@ -236,16 +241,13 @@ impl BroadPhase {
     pub fn clear(&mut self) {
         let device = std::mem::take(&mut self.device);
         *self = Self { config: self.config, device, ..Self::default() };
-        self.world.keep_old = self.old_to_keep();
     }
 
     /// Gives back the memory that the boxes and pairs at hand do not need.
     pub fn shrink_to_fit(&mut self) {
         self.world.shrink();
         self.kept.shrink(self.world.ids());
-        (self.store, self.engines) = (Store::default(), Engines::default());
-        self.comparison = Scratch::default();
-        self.holder = Holder::Nothing;
+        (self.look_up, self.search, self.comparison) = Default::default();
         self.events.added.shrink_to_fit();
         self.events.removed.shrink_to_fit();
     }

@@ -1,9 +1,9 @@
-//! Questions to a broad phase: its boxes, its pairs, and the report of the last update.
+//! Queries of a broad phase: its boxes, its pairs, and the report of the last update.
 
 use super::{BroadPhase, Events};
-use crate::holder::Holder;
+use crate::grid::occupied_cells;
 use crate::report::Report;
-use crate::{Aabb, Config, OccupiedCell, Pair, ProxyFilter};
+use crate::{Aabb, Algorithm, BoxIndex, Config, OccupiedCell, Pair, ProxyFilter};
 
 impl BroadPhase {
     /// Returns the settings in force.
@@ -79,7 +79,7 @@ impl BroadPhase {
     }
 
     /// Yields the pairs of one box (see [`BroadPhase::pair_count`]), sorted by the other one. The first call after a
-    /// rebuild looks at all pairs, later calls at the pairs of the box.
+    /// search looks at all pairs, later calls at the pairs of the box.
     pub fn pairs_of(&self, id: u32) -> impl Iterator<Item = Pair> {
         self.kept.partners(id).map(move |other| Pair::new(id, other)).filter(|pair| self.exists(pair))
     }
@@ -99,13 +99,34 @@ impl BroadPhase {
         !self.world.was_removed(pair.a) && !self.world.was_removed(pair.b)
     }
 
-    /// Returns the occupied cells of the grid, or the leaves of the tree, for pictures. There are none if the last update needed
-    /// neither or ran on a GPU. Takes time and memory in proportion to the cells.
+    /// Returns the tree of all stored (fat) boxes as they are now, for scene queries. The first call after a change brings it up to
+    /// date.
+    ///
+    /// ```
+    /// use pbig_core::{Aabb, BroadPhase, ProxyFilter};
+    /// let mut broad_phase = BroadPhase::default();
+    /// broad_phase.set(7, Aabb::new([2.0, -1.0, -1.0], [4.0, 1.0, 1.0]), ProxyFilter::ALL)?;
+    /// let mut met = vec![];
+    /// let origin = Aabb::new([0.0; 3], [0.0; 3]);
+    /// broad_phase.index().cast_aabb(&origin, [1.0, 0.0, 0.0], 100.0, |id| {
+    ///     met.push(id);
+    ///     100.0
+    /// });
+    /// assert_eq!(met, [7]);
+    /// # Ok::<(), pbig_core::Error>(())
+    /// ```
+    #[inline(always)]
+    pub fn index(&self) -> &BoxIndex {
+        self.world.tree.get(&self.world)
+    }
+
+    /// Returns the occupied cells of a grid like that of the last update, or the leaves of its tree, for pictures. There are none if the
+    /// last update needed neither. Takes time and memory as a search.
     pub fn cells(&self) -> Vec<OccupiedCell> {
-        match self.holder {
-            Holder::Grid => self.store.grid.occupied_cells(),
-            Holder::Tree => self.store.tree.occupied_leaves(),
-            Holder::Nothing | Holder::Lanes => Vec::new(),
+        match self.report.plan.algorithm {
+            Algorithm::Grid => occupied_cells(&self.world.boxes),
+            Algorithm::Tree | Algorithm::LookUp => self.index().occupied_leaves(),
+            _ => Vec::new(),
         }
     }
 
@@ -121,24 +142,7 @@ impl BroadPhase {
     /// ```
     pub fn overlapping(&self, aabb: &Aabb) -> Vec<u32> {
         let mut ids = Vec::new();
-        if !aabb.is_valid() {
-            return ids;
-        }
-        if self.overlapping_in_grid(aabb, &mut |id| ids.push(id)) {
-            return ids;
-        }
-        let overlaps = |(_, stored): &(usize, &Aabb)| aabb.overlaps(stored);
-        ids.extend(self.world.boxes.iter().enumerate().filter(overlaps).map(|(id, _)| id as u32));
+        self.index().overlapping(aabb, |id| ids.push(id));
         ids
-    }
-
-    /// Answers [`BroadPhase::overlapping`] from the grid. Returns false, and finds nothing, if there is no grid of all boxes: the
-    /// last update used none, or boxes have changed since.
-    pub fn overlapping_in_grid(&self, aabb: &Aabb, found: &mut dyn FnMut(u32)) -> bool {
-        let has_grid = self.holder == Holder::Grid && self.world.changed.is_empty();
-        if has_grid && aabb.is_valid() {
-            self.store.grid.overlapping(aabb, found);
-        }
-        has_grid
     }
 }

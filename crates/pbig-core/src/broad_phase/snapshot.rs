@@ -90,10 +90,8 @@ impl Snapshot {
         for (id, _) in self.present.iter().enumerate().filter(|(_, present)| **present) {
             world.insert(id as u32, bytemuck::cast(self.boxes[id]), self.filters[id], 0.0);
         }
-        // Only the changes of the snapshot count, not these insertions. Old states are not saved: the next update
-        // does not edit, and finds the same events. Saved pairs are trusted, as those of an update are.
+        // Only the changes of the snapshot count, not these insertions. Saved pairs are trusted, as those of an update are.
         world.forget_changes();
-        world.keep_old = 0;
         self.changed.iter().for_each(|&id| world.note_change(id));
         restored.kept.replace(&self.pairs, self.boxes.len());
         Ok(restored)

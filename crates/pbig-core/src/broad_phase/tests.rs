@@ -1,7 +1,5 @@
 //! Random worlds against the oracle, update by update: every engine gives the events that lead from one set to the next.
 
-use super::engines::edit::EditLimits;
-use crate::pairs::Comparison;
 use crate::{Aabb, Algorithm, BroadPhase, Config, Engine, Error, Limits, Pair, ProxyFilter, oracle};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -70,7 +68,7 @@ impl Checked {
 fn many_gone_and_one_new_take_few_tests() {
     let at = |x: u32| Aabb::from_center([3.0 * x as f32, 0.0, 0.0], [1.0; 3]);
     let mut broad_phase =
-        BroadPhase::new(Config { engine: Some(Engine::Sweep), ..Config::DEFAULT }).expect("a margin");
+        BroadPhase::new(Config { engine: Some(Engine::LookUp), ..Config::DEFAULT }).expect("a margin");
     (0..2000).for_each(|id| broad_phase.set(id, at(id), ProxyFilter::ALL).expect("few boxes"));
     broad_phase.update().expect("few pairs");
     (0..1900).for_each(|id| _ = broad_phase.remove(id));
@@ -149,9 +147,9 @@ fn every_engine_follows_random_worlds() {
 }
 
 #[test]
-fn an_edit_that_finds_too_many_pairs_does_not_list_them_all() {
+fn look_ups_that_find_too_many_pairs_do_not_list_them_all() {
     let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
-    let config = Config { limits, engine: Some(Engine::Edit), ..Config::DEFAULT };
+    let config = Config { limits, engine: Some(Engine::LookUp), ..Config::DEFAULT };
     let mut broad_phase = BroadPhase::new(config).expect("a margin");
     let cube = |id: u32| Aabb::from_center([10.0 * id as f32, 0.0, 0.0], [0.5; 3]);
     (0..2000).for_each(|id| broad_phase.set(id, cube(id), ProxyFilter::ALL).expect("room"));
@@ -236,36 +234,11 @@ fn a_clone_goes_on_as_the_original() {
             // An id that had no box before, if there are gaps.
             one.set(1, Aabb::from_center([0.3; 3], [0.1; 3]), ProxyFilter::ALL).expect("few boxes");
             one.update().expect("few pairs");
-            assert_eq!(one.report().plan.algorithm, Algorithm::Tree);
+            assert_eq!(one.report().plan.algorithm, Algorithm::LookUp);
             assert!(one.pairs().eq(oracle::pairs(one.fat_aabbs())));
         }
         assert_eq!(broad_phase.events(), clone.events());
     }
-}
-
-#[test]
-fn an_edit_stops_soon_after_its_work_is_beyond_the_limit() {
-    let mut broad_phase = BroadPhase::default();
-    let cube = |id: u32, far: f32| {
-        let at = [id % 30, id / 30 % 30, id / 900].map(|i| i as f32 * 2.0 + far);
-        Aabb::from_center(at, [0.5; 3])
-    };
-    (0..20_000).for_each(|id| broad_phase.set(id, cube(id, 0.0), ProxyFilter::ALL).expect("few boxes"));
-    broad_phase.update().expect("few pairs");
-    // All into one border cell: a list of a thousand boxes, looked through a thousand times.
-    (0..1000).for_each(|id| assert!(broad_phase.set_aabb(id, cube(id, 1e6))));
-    let world = &broad_phase.world;
-    let mut run = |work: u64| {
-        let limits = EditLimits { pairs: u64::MAX, work };
-        let (mut grid, mut events) = (broad_phase.store.grid.clone(), Comparison::default());
-        broad_phase.engines.edit.find(world, &mut grid, &mut events, limits)
-    };
-    let (is_done, all) = run(u64::MAX);
-    assert!(is_done && all > 1_000_000, "{all}");
-    assert_eq!(run(all), (true, all));
-    let (is_done, part) = run(all / 10);
-    // Beyond by what each thread does between two looks at the budget.
-    assert!(!is_done && part < all / 2, "{part} of {all}");
 }
 
 #[test]
@@ -327,42 +300,4 @@ fn look_ups_given_up_cost_at_most_64_tests_a_box() {
     let [update, search] = [broad_phase.report(), finder.report()].map(|report| report.work);
     assert!(update > 50 * n as u64, "{update}: no look-up was given up");
     assert!(update <= 3 * search / 2 + 64 * n as u64, "{update}, and {search} in a search");
-}
-
-/// Counts tell before any look-up that each changed box would be tested against all the others.
-#[test]
-fn boxes_that_outgrow_the_cells_are_not_looked_up() {
-    let n = 20_000u32;
-    let cube = |id: u32, half: f32| {
-        Aabb::from_center([id % 100, id / 100, 0].map(|x| 2.0 * x as f32), [half, 0.5, 0.5])
-    };
-    let mut broad_phase = BroadPhase::default();
-    (0..n).for_each(|id| broad_phase.set(id, cube(id, 0.5), ProxyFilter::ALL).expect("a small id"));
-    broad_phase.update().expect("few pairs");
-    let search = broad_phase.report().work;
-    (0..n / 25).for_each(|i| assert!(broad_phase.set_aabb(25 * i, cube(25 * i, 0.7))));
-    broad_phase.update().expect("few pairs");
-    let work = broad_phase.report().work;
-    assert!(work <= search + search / 2, "{work}, and {search} in a search");
-}
-
-/// Boxes that were removed leave free lanes, which must not be tested for each of the others.
-#[test]
-fn a_sweep_tests_no_free_lanes_where_most_boxes_changed() {
-    let at = |x: u32| Aabb::from_center([2.0 * x as f32, 0.0, 0.0], [0.5; 3]);
-    let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a margin");
-    let move_all = |broad_phase: &mut BroadPhase, ids: std::ops::Range<u32>, by: u32| {
-        ids.for_each(|id| broad_phase.set(id, at(id + by), ProxyFilter::ALL).expect("a small id"));
-        broad_phase.update().expect("few pairs");
-    };
-    move_all(&mut broad_phase, 0..864, 0);
-    move_all(&mut broad_phase, 0..150, 1);
-    for first in [400, 516, 632, 748] {
-        assert!((first..first + 116).all(|id| broad_phase.remove(id)));
-        broad_phase.update().expect("few pairs");
-    }
-    move_all(&mut broad_phase, 0..201, 2);
-    let report = broad_phase.report();
-    assert_eq!(report.plan.algorithm, Algorithm::Sweep);
-    assert!(report.work <= 400 * 400, "{}", report.work);
 }

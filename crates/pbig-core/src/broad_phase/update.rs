@@ -1,13 +1,22 @@
-//! An update: choose an engine, run it, keep the pairs, report.
+//! An update: look up or search, keep the pairs, report.
 
-use super::engines::Task;
-use super::{BroadPhase, Events};
-use crate::holder::Holder;
+use super::look_up::LookUp;
+use super::search::Search;
+use super::tree::Tree;
+use super::{BroadPhase, Events, Task};
+use crate::device_slot::DeviceSlot;
 use crate::outcome::{End, Outcome};
 use crate::pairs::Comparison;
-use crate::policy::{self, Counts, Work};
+use crate::policy::{self, Work};
 use crate::report::Clock;
 use crate::{Backend, Engine, Error, Plan};
+
+/// What finds the events.
+struct Parts<'a> {
+    device: &'a mut DeviceSlot,
+    look_up: &'a mut LookUp,
+    search: &'a mut Search,
+}
 
 impl BroadPhase {
     /// Finds what has changed since the last update. Takes next to no time when nothing has.
@@ -18,11 +27,11 @@ impl BroadPhase {
         self.events.added.clear();
         self.events.removed.clear();
         self.begin_report();
-        // An engine writes into the memory of the last events.
+        // The memory of the last events takes the new ones.
         self.swap_events();
         let done = self.update_pairs();
         if done.is_err() {
-            self.fail();
+            self.comparison.clear();
         }
         self.settle();
         self.swap_events();
@@ -43,66 +52,56 @@ impl BroadPhase {
         }
         self.kept.reserve_ids(self.world.ids());
         self.find_events()?;
-        self.last_events = self.comparison.added.len() + self.comparison.removed.len();
+        let mut tree = std::mem::take(&mut self.world.tree);
+        tree.end_update(&self.world);
+        self.world.tree = tree;
         self.world.forget_changes();
-        self.world.keep_old = self.old_to_keep();
         Ok(())
     }
 
     fn find_events(&mut self) -> Result<(), Error> {
         let changed = self.world.changed.len();
         if self.device.is_wanted(&self.config, Work::Update(changed as u64), &mut self.report) {
-            let outcome = self.run(None);
+            let outcome = self.run(|parts, task, tree| parts.search.run(task, tree, Some(parts.device)));
             if self.take(outcome)? {
                 return Ok(());
             }
         }
-        let engine = self.choose_engine();
-        let outcome = self.run(Some(engine));
-        if engine != Engine::Rebuild {
+        if self.may_look_up(changed) {
+            let outcome = self.run(|parts, task, tree| parts.look_up.run(task, tree));
             self.given_up.note(outcome.end == End::GivenUp, changed);
+            if self.take(outcome)? {
+                return Ok(());
+            }
         }
-        if !self.take(outcome)? {
-            let outcome = self.run(Some(Engine::Rebuild));
-            let is_done = self.take(outcome)?;
-            debug_assert!(is_done, "a rebuild never gives up");
-        }
+        let outcome = self.run(|parts, task, tree| parts.search.run(task, tree, None));
+        let is_done = self.take(outcome)?;
+        debug_assert!(is_done, "a search on the CPU never gives up");
         Ok(())
     }
 
-    fn choose_engine(&mut self) -> Engine {
-        if self.config.backend == Backend::Brute {
-            return Engine::Rebuild;
-        }
-        let counts = Counts {
-            boxes: self.world.present.len(),
-            changed: self.world.changed.len(),
-            knows_old: self.world.knows_old(),
-            holder: self.holder,
-            spilled: self.store.grid.spilled(),
-            events: self.last_events,
-        };
-        let engine = policy::choose_engine(&counts, self.config.engine);
+    /// Returns true if the changed boxes should be looked up.
+    fn may_look_up(&mut self, changed: usize) -> bool {
         match self.config.engine {
-            Some(_) => engine,
-            None => self.given_up.instead_of(engine, counts.changed),
+            _ if self.config.backend == Backend::Brute => false,
+            Some(engine) => engine == Engine::LookUp,
+            None => policy::may_look_up(self.world.present.len(), changed) && !self.given_up.forbids(changed),
         }
     }
 
-    /// Runs an engine; the device, if none is given.
-    fn run(&mut self, engine: Option<Engine>) -> Outcome {
-        let Self { world, config, holder, store, kept, comparison: events, .. } = self;
-        let mut task = Task { world, config, holder: *holder, store, kept, events };
-        match engine {
-            Some(engine) => self.engines.run(engine, &mut task),
-            None => self.engines.run_on(&mut self.device, &mut task),
-        }
+    /// Runs one of the ways to make an update.
+    fn run(&mut self, way: impl FnOnce(Parts<'_>, &mut Task<'_>, &mut Tree) -> Outcome) -> Outcome {
+        let mut tree = std::mem::take(&mut self.world.tree);
+        let Self { device, look_up, search, world, config, kept, comparison: events, .. } = self;
+        let mut task = Task { world, config, kept, events };
+        let outcome = way(Parts { device, look_up, search }, &mut task, &mut tree);
+        self.world.tree = tree;
+        outcome
     }
 
-    /// Adds an outcome to the report, and applies the events to the kept pairs. Returns false if the engine gave up.
+    /// Adds an outcome to the report, and applies the events to the kept pairs. Returns false if it was given up.
     fn take(&mut self, outcome: Outcome) -> Result<bool, Error> {
         let has_replaced_kept = outcome.has_replaced_kept;
-        self.holder = outcome.holder;
         let is_done = self.report.add(outcome, &self.config)?;
         if is_done && !has_replaced_kept {
             self.apply_events()?;
@@ -110,7 +109,7 @@ impl BroadPhase {
         Ok(is_done)
     }
 
-    /// Keeps the added pairs of an engine, and forgets the ended ones.
+    /// Keeps the added pairs, and forgets the ended ones.
     fn apply_events(&mut self) -> Result<(), Error> {
         let mut clock = Clock::start();
         let events = &self.comparison;
@@ -125,25 +124,14 @@ impl BroadPhase {
         Ok(())
     }
 
-    /// Makes the next update begin from the boxes and the kept pairs alone.
-    fn fail(&mut self) {
-        self.holder = Holder::Nothing;
-        self.comparison.clear();
-    }
-
     /// Gives back a piece of the memory that a peak has left.
     fn settle(&mut self) {
         let Comparison { added, removed, dropped, .. } = &*self.comparison;
         let (pairs, events) = (self.kept.len(), added.len() + removed.len() + dropped.len());
-        self.engines.settle(pairs);
+        self.look_up.settle();
+        self.search.settle(pairs);
         self.comparison.settle(events);
         self.kept.settle(events);
-        self.store.settle(self.holder);
-    }
-
-    /// Returns the number of old states to keep until the next update.
-    pub(super) fn old_to_keep(&self) -> usize {
-        policy::old_states_to_keep(self.len(), self.config.engine)
     }
 
     /// Begins an empty report.

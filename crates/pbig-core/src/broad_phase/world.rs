@@ -1,24 +1,17 @@
 //! The world: what is kept of each box by id, and which boxes have changed since the last update. It knows no grid.
 
+use super::tree::Tree;
 use crate::id_set::IdSet;
 use crate::{Aabb, ProxyFilter};
 
-/// A word for each id: two flags, and 1 + the place in the list of changed ids, or 0.
+/// A byte for each id: flags.
 mod state {
     /// The box was set and not removed.
-    pub(super) const PRESENT: u32 = 1 << 31;
+    pub(super) const PRESENT: u8 = 1;
     /// The box of the last update was removed since: its pairs end without an event.
-    pub(super) const REMOVED: u32 = 1 << 30;
-    /// The place in the list.
-    pub(super) const CHANGE: u32 = REMOVED - 1;
-}
-
-/// A box as it was at the last update.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Old {
-    /// [`Aabb::NOWHERE`] if the box was absent or invalid.
-    pub(crate) aabb: Aabb,
-    pub(crate) filter: ProxyFilter,
+    pub(super) const REMOVED: u8 = 2;
+    /// The id is in the list of changed ids.
+    pub(super) const CHANGED: u8 = 4;
 }
 
 /// Boxes by id.
@@ -27,13 +20,9 @@ pub(crate) struct World {
     /// Fat boxes; [`Aabb::NOWHERE`] for absent and invalid ones.
     pub(super) boxes: Vec<Aabb>,
     pub(super) filters: Vec<ProxyFilter>,
-    states: Vec<u32>,
+    states: Vec<u8>,
     /// Ids that have changed since the last update, each once.
     pub(super) changed: Vec<u32>,
-    /// Old states of the first ids in `changed`. Shorter than `changed` if too many have changed for an edit.
-    pub(super) old: Vec<Old>,
-    /// Maximum number of old states.
-    pub(super) keep_old: usize,
     /// Ids whose box of the last update was removed.
     pub(super) removed: Vec<u32>,
     /// Ids whose box was set and not removed, valid or not.
@@ -41,6 +30,7 @@ pub(crate) struct World {
     pub(super) valid: u32,
     /// Boxes that were ever given a filter other than [`ProxyFilter::ALL`].
     pub(super) is_filtered: bool,
+    pub(super) tree: Tree,
 }
 
 impl World {
@@ -66,15 +56,10 @@ impl World {
         !self.removed.is_empty()
     }
 
-    /// Returns the place of a box in `changed`, if it has changed.
+    /// Returns true if a box has changed since the last update.
     #[inline(always)]
-    pub(super) fn change_of(&self, id: u32) -> Option<usize> {
-        ((self.states[id as usize] & state::CHANGE) as usize).checked_sub(1)
-    }
-
-    /// Returns true if `old` has the old state of every changed box.
-    pub(super) fn knows_old(&self) -> bool {
-        self.old.len() == self.changed.len()
+    pub(super) fn has_changed(&self, id: u32) -> bool {
+        self.states[id as usize] & state::CHANGED != 0
     }
 
     /// Makes ids below `ids` known.
@@ -153,30 +138,27 @@ impl World {
         if *state & state::REMOVED == 0 {
             self.removed.push(id);
         }
-        *state = *state & state::CHANGE | state::REMOVED;
+        *state = *state & state::CHANGED | state::REMOVED;
         self.present.remove(id);
     }
 
-    /// Notes the first change of a box since the last update, and its old state.
+    /// Notes a change of a box.
     #[inline(always)]
     pub(super) fn note_change(&mut self, id: u32) {
-        let i = id as usize;
-        if self.states[i] & state::CHANGE == 0 {
-            if self.old.len() < self.keep_old && self.knows_old() {
-                self.old.push(Old { aabb: self.boxes[i], filter: self.filters[i] });
-            }
+        self.tree.expire();
+        let state = &mut self.states[id as usize];
+        if *state & state::CHANGED == 0 {
+            *state |= state::CHANGED;
             self.changed.push(id);
-            self.states[i] |= self.changed.len() as u32;
         }
     }
 
-    /// Forgets all changes, after an update.
+    /// Forgets all changes, after an update. The tree has noted them.
     pub(super) fn forget_changes(&mut self) {
         for &id in &self.changed {
             self.states[id as usize] &= state::PRESENT;
         }
         self.changed.clear();
-        self.old.clear();
         self.removed.clear();
     }
 
@@ -190,9 +172,9 @@ impl World {
         self.filters.shrink_to_fit();
         self.states.shrink_to_fit();
         self.changed.shrink_to_fit();
-        self.old.shrink_to_fit();
         self.removed.shrink_to_fit();
         self.present.shrink();
+        self.tree = Tree::default();
     }
 }
 

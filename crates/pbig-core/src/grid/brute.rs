@@ -2,27 +2,70 @@
 
 use super::hits::{Hits, Rule};
 use super::record::Record;
-use crate::Aabb;
+use super::simd::{BLOCK, EightBoxes, Simd, dispatch};
 use crate::parallel::run_with;
+use crate::{Aabb, Pair};
 
 /// Number of boxes of the larger set in a piece of work.
 const PIECE: usize = 4096;
 
-/// Tests every pair of valid boxes; returns how many are valid.
+/// Tests every pair of valid boxes, eight at a time; returns how many are valid. The pairs are sorted.
 pub(crate) fn brute_force(boxes: &[Aabb], rule: &Rule<'_>, hits: &mut Hits) -> usize {
-    let valid = boxes.iter().enumerate().filter(|(_, aabb)| aabb.is_valid());
-    let mut records = std::mem::take(&mut hits.records);
-    records.clear();
-    records.extend(valid.map(|(id, aabb)| Record::new(*aabb, id as u32, 0)));
-    for (i, one) in records.iter().enumerate() {
-        hits.test_run(one, &records[i + 1..], rule);
+    let mut blocks = std::mem::take(&mut hits.blocks);
+    let mut ids = std::mem::take(&mut hits.ids);
+    blocks.clear();
+    ids.clear();
+    for (id, aabb) in (0u32..).zip(boxes).filter(|(_, aabb)| aabb.is_valid()) {
+        let lane = ids.len() % BLOCK;
+        if lane == 0 {
+            blocks.push(Block::EMPTY);
+        }
+        ids.push(id);
+        blocks.iter_mut().next_back().into_iter().for_each(|block| block.set(lane, aabb));
+    }
+    dispatch!(test_all, boxes, &blocks, &ids, rule, hits);
+    let valid = ids.len();
+    (hits.blocks, hits.ids) = (blocks, ids);
+    valid
+}
+
+/// Eight boxes. Aligned, as every second load would cross a cache line.
+#[repr(align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block(EightBoxes);
+
+impl Block {
+    /// Boxes that overlap nothing.
+    const EMPTY: Self = Self([[f32::NAN; BLOCK]; 6]);
+
+    fn set(&mut self, lane: usize, aabb: &Aabb) {
+        let values = aabb.min.into_iter().chain(aabb.max);
+        self.0.iter_mut().zip(values).for_each(|(row, value)| row[lane] = value);
+    }
+}
+
+/// Tests each box against those behind it.
+#[inline(always)]
+fn test_all(simd: impl Simd, boxes: &[Aabb], blocks: &[Block], ids: &[u32], rule: &Rule<'_>, hits: &mut Hits) {
+    for (i, &id) in ids.iter().enumerate() {
+        let (aabb, from) = (&boxes[id as usize], hits.pairs.len());
+        // The first block also has the box itself and those before it.
+        let mut wanted = 255 & !((2 << (i % BLOCK)) - 1);
+        for (block, Block(eight)) in blocks.iter().enumerate().skip(i / BLOCK) {
+            let mut met = simd.overlaps_eight(eight, aabb) & wanted;
+            wanted = 255;
+            while met != 0 {
+                let b = ids[block * BLOCK + met.trailing_zeros() as usize];
+                hits.pairs.push(Pair { a: id, b });
+                met &= met - 1;
+            }
+        }
+        hits.tests += (ids.len() - 1 - i) as u64;
+        hits.keep(from, rule);
         if hits.is_full {
             break;
         }
     }
-    let valid = records.len();
-    hits.records = records;
-    valid
 }
 
 /// Tests every valid box of a set against every one of another set, whose ids are behind those of the first; returns how many are

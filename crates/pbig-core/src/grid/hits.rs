@@ -4,6 +4,7 @@
 //! tested, while the records further ahead are on their way. (Tested at once, each would wait for its record.) The test
 //! has no branch: a pair is written, and kept or overwritten by the next one.
 
+use super::brute::Block;
 use super::record::Record;
 use super::simd::{BLOCK, Simd, eight_from, prefetch};
 use crate::boxes::share_no_key;
@@ -96,8 +97,9 @@ pub(crate) struct Hits {
     /// Number of listed pairs that were added to the count of all threads.
     accounted: usize,
     pub(super) is_full: bool,
-    /// The boxes of [`brute_force`](super::brute_force).
-    pub(super) records: Vec<Record>,
+    /// The boxes of [`brute_force`](super::brute_force), and their ids.
+    pub(super) blocks: Vec<Block>,
+    pub(super) ids: Vec<u32>,
 }
 
 /// Room for the hits of a writer.

@@ -2,7 +2,6 @@
 //!
 //! ```text
 //! bounds ─► plan ─► build (keys, two counting sorts, codes) ─► search ─► hits (exact test) ─► pairs
-//!                     └─► edit: boxes that moved since, in place ─► lookup
 //! ```
 //!
 //! A search visits half of each box's neighbouring cells as contiguous runs of slots, tests 64-bit codes (`cells`), and
@@ -15,9 +14,7 @@ mod brute;
 mod build;
 mod cells;
 mod count;
-mod edit;
 mod hits;
-mod lookup;
 mod occupied;
 mod record;
 mod search;
@@ -31,11 +28,9 @@ pub(crate) use avx2::Avx2;
 pub(crate) use brute::{brute_force, brute_force_across};
 pub(crate) use build::TwoGrids;
 pub(crate) use count::scattered;
-pub(crate) use edit::EditedGrid;
 pub(crate) use hits::{ById, Hits, Receiver, Rule};
-pub(crate) use lookup::{Budget, Candidates, Place};
 pub use occupied::OccupiedCell;
-pub(crate) use record::Record;
+pub(crate) use occupied::occupied_cells;
 pub(crate) use search::Sorted;
 pub use simd::simd;
 pub(crate) use simd::{BLOCK, Eight, EightBoxes, Portable, Simd, dispatch, prefetch};
@@ -44,6 +39,7 @@ pub use spacing::NeighbourScan;
 
 use crate::memory::{Scratch, ShrinkingVec};
 use build::BucketCounts;
+use record::Record;
 
 /// A grid with its buffers.
 #[derive(Clone, Debug, Default)]
@@ -58,7 +54,7 @@ pub(crate) struct Grid {
     starts: ShrinkingVec<u32>,
     /// Slots in use.
     pub(crate) len: usize,
-    /// Boxes of the last build; 0 once they are elsewhere.
+    /// Boxes of the last build, if it was since the last update.
     room: usize,
     /// Boxes too large for the cells.
     pub(crate) oversize: Vec<Record>,
@@ -69,15 +65,14 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Gives back memory that the boxes did not need, neither for a build since the last call nor because the grid holds them.
-    fn settle(&mut self, holds_boxes: bool) {
-        let room = self.room;
+    /// Gives back memory that a build since the last call did not need.
+    pub(crate) fn settle(&mut self) {
+        let room = std::mem::take(&mut self.room);
         let cells = if room > 0 { self.starts.len().min(self.plan.cells.count() + 4) } else { 0 };
         self.records.settle(room);
         self.coarse.settle(room);
         self.codes.settle(room + 2 * BLOCK);
         self.starts.settle(cells);
-        self.room = if holds_boxes { room } else { 0 };
     }
 
     /// Returns the codes of eight slots.

@@ -1,7 +1,8 @@
 //! The occupied cells of a grid, for pictures.
 
 use super::cells::steps_portable;
-use super::edit::EditedGrid;
+use super::Grid;
+use super::spacing::GridPlan;
 use crate::Aabb;
 
 /// A cell of a grid with the boxes whose lower corners lie in it, or a leaf of a tree with its boxes.
@@ -14,18 +15,17 @@ pub struct OccupiedCell {
     pub ids: Vec<u32>,
 }
 
-impl EditedGrid {
-    /// Returns the cells in which boxes lie.
-    pub(crate) fn occupied_cells(&self) -> Vec<OccupiedCell> {
-        let all = 0..self.grid.plan.cells.count();
-        all.filter_map(|key| self.occupied_cell(key)).collect()
-    }
+/// Sorts boxes into a grid, and returns the cells in which some lie.
+pub(crate) fn occupied_cells(boxes: &[Aabb]) -> Vec<OccupiedCell> {
+    let (plan, mut grid) = (GridPlan::new(boxes, None, 1), Grid::default());
+    grid.build(plan, boxes, 1);
+    (0..plan.cells.count()).filter_map(|key| grid.occupied_cell(key)).collect()
+}
 
+impl Grid {
     fn occupied_cell(&self, key: usize) -> Option<OccupiedCell> {
-        let (first, end) = self.grid.slots((key, 1));
-        let in_slots = self.grid.records[first..end].iter();
-        let mut records: Vec<_> = in_slots.filter(|record| record.aabb.is_valid()).collect();
-        self.spill.visit((key, 1), |entry| records.push(self.spill.record(entry)));
+        let (first, end) = self.slots((key, 1));
+        let records = &self.records[first..end];
         let first = self.cell_around(&records.first()?.aabb);
         let with = |cell: Aabb, corner: [f32; 3]| cell.union(&Aabb::new(corner, corner));
         let aabb = records.iter().fold(first, |cell, record| with(cell, record.aabb.min));
@@ -34,7 +34,7 @@ impl EditedGrid {
 
     /// Returns the cell in which the lower corner of a box lies.
     fn cell_around(&self, aabb: &Aabb) -> Aabb {
-        let cells = &self.grid.plan.cells;
+        let cells = &self.plan.cells;
         let (low, _) = steps_portable(cells, aabb);
         let edge = cells.edges();
         let min: [f32; 3] = std::array::from_fn(|k| {

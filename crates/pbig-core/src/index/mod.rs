@@ -61,7 +61,7 @@ pub struct BoxIndex {
     grown: usize,
     /// By id: the lane of its box, or `NONE`.
     places: Vec<u32>,
-    /// Length of the list of boxes at the last layout.
+    /// Boxes at the last layout.
     listed: usize,
     /// Length of the list of boxes at the last refresh.
     known: usize,
@@ -136,7 +136,7 @@ impl BoxIndex {
     /// Counts nodes that a query has looked at, where they can lead to a sort. Threads may lose each other's counts: an atomic addition
     /// takes as long as a node.
     #[inline(always)]
-    fn note(&self, looked_at: u64) -> u64 {
+    pub(crate) fn note(&self, looked_at: u64) -> u64 {
         if self.sort_after.is_some() {
             let before = self.looked_at.0.load(Ordering::Relaxed);
             self.looked_at.0.store(before + looked_at, Ordering::Relaxed);

@@ -5,7 +5,7 @@ use super::node::{LANES, NONE, Node, extent_sum};
 use super::sort::{Entry, sort};
 use crate::Aabb;
 use crate::grid::{Simd, dispatch, prefetch};
-use crate::parallel::{SharedSlice, alone, available_threads, run};
+use crate::parallel::{SharedSlice, available_threads, run};
 use crate::policy::{PARALLEL_FROM_BOXES, index as policy};
 use std::sync::atomic::Ordering;
 
@@ -20,46 +20,80 @@ impl BoxIndex {
     /// may differ from those at the last call, in any order, repeated or not; without it any box may differ. Ids beyond the list have
     /// no box. Shares the work of many boxes among rayon's threads.
     pub fn refresh(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
-        self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
         let gone = boxes.len() as u32..self.known as u32;
-        let is_few = |changed: &&[u32]| (changed.len() + gone.len()) * policy::REFIT_SHARE < self.listed;
-        match changed.filter(is_few) {
-            Some(changed) => {
-                changed.iter().copied().chain(gone).for_each(|id| self.take(id, boxes));
-            }
-            None => self.refit(boxes),
+        if changed.is_none() || gone.is_empty() {
+            return self.renew(boxes, changed, 0..boxes.len() as u32);
+        }
+        let changed: Vec<u32> = changed.unwrap_or_default().iter().copied().chain(gone).collect();
+        self.renew(boxes, Some(&changed), 0..boxes.len() as u32);
+    }
+
+    /// As [`BoxIndex::refresh`]; no id but the `present` ones has a box.
+    pub(crate) fn renew(
+        &mut self,
+        boxes: &[Aabb],
+        changed: Option<&[u32]>,
+        present: impl Iterator<Item = u32> + Clone,
+    ) {
+        self.read(boxes, changed, present.clone());
+        if self.is_bad() {
+            self.lay_out(boxes, present, self.has_earned_sort().then_some(u32::MAX));
+        }
+    }
+
+    /// As [`BoxIndex::renew`], and leaves the boxes sorted. Returns the number of boxes that were read.
+    pub(crate) fn follow(
+        &mut self,
+        boxes: &[Aabb],
+        changed: Option<&[u32]>,
+        present: impl Iterator<Item = u32> + Clone,
+    ) -> usize {
+        let mut read = 0;
+        if self.is_sorted {
+            read = self.read(boxes, changed, present.clone());
+        }
+        if !self.is_sorted || self.is_bad() {
+            self.sort_present(boxes, present);
+            read += boxes.len();
+        }
+        read
+    }
+
+    /// Reads the changed boxes, if they are few, or all. Returns the number of boxes that were read.
+    fn read(
+        &mut self,
+        boxes: &[Aabb],
+        changed: Option<&[u32]>,
+        present: impl Iterator<Item = u32>,
+    ) -> usize {
+        self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
+        let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < boxes.len();
+        let few = changed.filter(is_few);
+        match few {
+            Some(changed) => self.take(boxes, changed),
+            None => self.refit(boxes, present),
         }
         self.known = boxes.len();
         self.plan_sort();
-        if self.wants_sort() || self.loose().len() > policy::loose_leaves(self.leaves) {
-            self.lay_out(boxes, self.has_earned_sort().then_some(u32::MAX));
-        }
+        few.map_or(self.listed, <[u32]>::len)
     }
 
-    /// As [`BoxIndex::refresh`], on the caller's thread alone: for a caller whose lock other tasks of rayon's threads wait for.
-    #[doc(hidden)]
-    pub fn refresh_alone(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
-        alone(|| self.refresh(boxes, changed));
+    /// Returns true if the boxes should be laid out anew.
+    fn is_bad(&self) -> bool {
+        self.wants_sort() || self.loose().len() > policy::loose_leaves(self.leaves)
     }
 
-    /// Reads the changed boxes, for an owner that looks up each of them, and writes them in the order of their places to `order`.
-    /// Returns false if the boxes should be sorted before.
-    pub(crate) fn follow(&mut self, boxes: &[Aabb], changed: &[u32], order: &mut Vec<u64>) -> bool {
-        // A clone is empty.
-        if !self.is_sorted {
-            return false;
-        }
-        self.has_moved = true;
-        for &id in changed {
-            if self.places.get(id as usize).is_none_or(|place| *place == NONE) {
-                self.take(id, boxes);
+    /// Reads few boxes.
+    fn take(&mut self, boxes: &[Aabb], ids: &[u32]) {
+        for &id in ids {
+            let has_place = self.places.get(id as usize).is_some_and(|place| *place != NONE);
+            if !has_place && boxes.get(id as usize).is_some_and(Aabb::is_valid) {
+                self.add(id, boxes);
             }
         }
-        self.in_order(changed, order);
-        dispatch!(Self::put_all, self, boxes, order);
-        self.plan_sort();
-        let is_loose = self.loose().len() > policy::loose_leaves(self.leaves);
-        !is_loose && !self.wants_sort()
+        let mut order = Vec::new();
+        self.in_order(ids, &mut order);
+        dispatch!(Self::put_all, self, boxes, &order);
     }
 
     /// Writes ids in the order of their places: place and id in one word.
@@ -108,19 +142,6 @@ impl BoxIndex {
         }
     }
 
-    /// Renames the boxes, as of the last sort: `names[id]` is the new id of the box `id`.
-    pub(crate) fn rename(&mut self, names: &[u32]) {
-        self.forget_places();
-        let ids = names.last().map_or(0, |last| *last as usize + 1);
-        self.places.resize(ids.max(self.places.len()), NONE);
-        for (leaf, node) in self.nodes[..self.leaves as usize].iter_mut().enumerate() {
-            for (lane, id) in node.children.iter_mut().enumerate().filter(|(_, id)| **id != NONE) {
-                *id = names[*id as usize];
-                self.places[*id as usize] = (leaf * LANES + lane) as u32;
-            }
-        }
-    }
-
     /// Clears the places of all boxes, without a pass over ids that have none.
     fn forget_places(&mut self) {
         for leaf in (0..self.leaves).chain(self.loose()) {
@@ -158,24 +179,29 @@ impl BoxIndex {
 
     /// Sorts the boxes as they are now.
     pub fn sort(&mut self, boxes: &[Aabb]) {
-        self.sort_sets(boxes, None);
+        self.sort_present(boxes, 0..boxes.len() as u32);
+    }
+
+    /// As [`BoxIndex::sort`]; no id but the `present` ones has a box.
+    pub(crate) fn sort_present(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>) {
+        self.lay_out(boxes, present, Some(u32::MAX));
     }
 
     /// Sorts the boxes; of two sets, ids from `split` on are the second, and no leaf has boxes of both.
     pub(crate) fn sort_sets(&mut self, boxes: &[Aabb], split: Option<u32>) {
-        self.lay_out(boxes, Some(split.unwrap_or(u32::MAX)));
+        self.lay_out(boxes, 0..boxes.len() as u32, Some(split.unwrap_or(u32::MAX)));
     }
 
     /// Reads all boxes.
-    fn refit(&mut self, boxes: &[Aabb]) {
+    fn refit(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>) {
         if self.end == 0 {
-            return self.lay_out(boxes, None);
+            return self.lay_out(boxes, present, None);
         }
         self.read_all(boxes);
         self.places.resize(boxes.len().max(self.places.len()), NONE);
-        for (id, aabb) in boxes.iter().enumerate() {
-            if self.places[id] == NONE && aabb.is_valid() {
-                self.add(id as u32, boxes);
+        for id in present {
+            if self.places[id as usize] == NONE && boxes[id as usize].is_valid() {
+                self.add(id, boxes);
             }
         }
     }
@@ -198,34 +224,6 @@ impl BoxIndex {
         self.grown += grown.map(usize::from).sum::<usize>();
     }
 
-    /// Reads one box.
-    fn take(&mut self, id: u32, boxes: &[Aabb]) {
-        let place = self.places.get(id as usize).copied().unwrap_or(NONE);
-        let aabb = boxes.get(id as usize).copied().unwrap_or(Aabb::NOWHERE);
-        if place != NONE {
-            dispatch!(Self::put, self, place, &aabb);
-        } else if aabb.is_valid() {
-            self.add(id, boxes);
-        }
-    }
-
-    /// Stores a box in a lane, and tells the ancestors of the node its bounds, up to the first one that they do not change.
-    #[inline(always)]
-    fn put(simd: impl Simd, index: &mut Self, mut place: u32, aabb: &Aabb) {
-        let mut aabb = *aabb;
-        while place != NONE {
-            let at = place as usize / LANES;
-            index.nodes[at].set(place as usize % LANES, &aabb);
-            aabb = simd.around(&index.nodes[at].boxes);
-            if index.bounds[at] == aabb {
-                return;
-            }
-            index.bounds[at] = aabb;
-            index.grown += usize::from(outgrows(&aabb, &mut index.extents[at]));
-            place = index.parents[at];
-        }
-    }
-
     /// Appends a box that has no place to the loose leaves.
     fn add(&mut self, id: u32, boxes: &[Aabb]) {
         if self.places.len() <= id as usize {
@@ -240,9 +238,9 @@ impl BoxIndex {
         let node = &mut self.nodes[at];
         let lane = node.children.iter().position(|child| *child == NONE).unwrap_or(LANES - 1);
         node.children[lane] = id;
-        let place = (at * LANES + lane) as u32;
-        self.places[id as usize] = place;
-        dispatch!(Self::put, self, place, &boxes[id as usize]);
+        node.set(lane, &boxes[id as usize]);
+        self.bounds[at] = self.bounds[at].union(&boxes[id as usize]);
+        self.places[id as usize] = (at * LANES + lane) as u32;
     }
 
     fn push(&mut self, node: Node) {
@@ -253,16 +251,16 @@ impl BoxIndex {
     }
 
     /// Makes all nodes anew: in the order of ids, or with a `split` sorted as two sets, the first with the ids below it.
-    fn lay_out(&mut self, boxes: &[Aabb], split: Option<u32>) {
-        let ids = (0u32..).zip(boxes).filter(|(_, aabb)| aabb.is_valid());
-        let mut entries: Vec<Entry> = ids.map(|(id, aabb)| Entry::new(id, aabb)).collect();
+    fn lay_out(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>, split: Option<u32>) {
+        let all = present.map(|id| (id, &boxes[id as usize])).filter(|(_, aabb)| aabb.is_valid());
+        let mut entries: Vec<Entry> = all.map(|(id, aabb)| Entry::new(id, aabb)).collect();
         self.forget_places();
         self.nodes.clear();
         self.parents.clear();
         self.bounds.clear();
         self.extents.clear();
         self.places.resize(boxes.len().max(self.places.len()), NONE);
-        self.listed = boxes.len();
+        self.listed = entries.len();
         let all = 0..entries.len();
         let classes = split.map_or_else(|| Vec::from([all]), |split| sort(&mut entries, split));
         let classes: Vec<_> = classes.into_iter().map(|class| self.push_leaves(&entries[class])).collect();

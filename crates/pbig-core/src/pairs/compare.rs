@@ -2,7 +2,7 @@
 
 use super::groups::{self, Groups, Span};
 use super::kept::{Kept, Rows};
-use super::row;
+use super::row::{self, equal};
 use crate::Pair;
 use crate::grid::{Simd, dispatch};
 use crate::memory::ShrinkingVec;
@@ -65,6 +65,27 @@ impl Comparison {
         kept.next = next;
         self.gather();
         kept.adopt_next(names, &self.added, &self.removed);
+    }
+
+    /// Compares sorted pairs with the kept ones. Only the ids `present` have pairs.
+    pub(crate) fn compare_sorted(
+        &mut self,
+        present: impl Iterator<Item = u32>,
+        found: impl Iterator<Item = Pair>,
+        kept: &Kept,
+    ) {
+        self.clear();
+        let (mut found, mut is) = (found.peekable(), Vec::new());
+        for a in present {
+            is.clear();
+            while let Some(pair) = found.next_if(|pair| pair.a == a) {
+                is.push(pair.b);
+            }
+            let was = kept.later_partners(a);
+            if !equal(was, &is) {
+                row::differences(a, was, &is, &mut self.added, &mut self.removed);
+            }
+        }
     }
 
     /// Gives back a piece of the memory that fewer events than before do not need. The last update had `events`.

@@ -17,10 +17,6 @@ pub(crate) const WORK_OF_EXACT_TEST: u64 = 4;
 /// Tests of codes that take as long as one that does not tell two boxes apart, and the exact test after it.
 pub(crate) const WORK_OF_VAGUE_TEST: u64 = 6;
 
-/// Tests of codes that take as long as a read from anywhere in memory: of an entry of a list, a box that is met, or the ends of a
-/// run of cells.
-pub(crate) const WORK_OF_ENTRY: u64 = 16;
-
 /// Maximum number of tests for each box for a search of the grid, in binary logarithms of the number of boxes: a tree is sorted and
 /// joined in about the same time.
 const GRID_UP_TO_LOGS_PER_BOX: u64 = 31;
@@ -48,11 +44,6 @@ const SAMPLE_WORK_PER_BOX: u64 = 16;
 /// Returns true if a grid with this work is faster than a tree.
 pub(crate) fn is_light(boxes: usize, work: u64) -> bool {
     work <= logs(boxes, GRID_UP_TO_LOGS_PER_BOX)
-}
-
-/// Returns the work of a grid that is as full as one may be.
-pub(super) fn work_of_full_grid(boxes: usize, pairs: usize) -> u64 {
-    logs(boxes, GRID_UP_TO_LOGS_PER_BOX) + GRID_UP_TO_PER_PAIR * pairs as u64
 }
 
 /// Returns the part of a box's work that its overlaps do not pay for.

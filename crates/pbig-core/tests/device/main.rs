@@ -56,7 +56,7 @@ fn edits_go_on_beside_a_device_that_fails() {
     for moved in 0..8 {
         world.set(moved, at(moved + 9000), ProxyFilter::ALL).expect("few boxes");
         world.update().expect("few pairs");
-        edits += u32::from(world.report().plan.algorithm == pbig_core::Algorithm::Edit);
+        edits += u32::from(world.report().plan.algorithm == pbig_core::Algorithm::LookUp);
     }
     assert_eq!(edits, 5, "{}", world.report().plan);
 }

@@ -29,7 +29,7 @@ fn read(input: &mut Input, filtered: bool) -> (Vec<Aabb>, Vec<ProxyFilter>) {
 /// Returns the settings of the finder. A forced engine takes a grid even for few boxes.
 pub(super) fn config(settings: u8) -> Config {
     let base = Config { backend: Backend::Cpu, ..Config::DEFAULT };
-    let grid = Config { engine: Some(Engine::Rebuild), ..base };
+    let grid = Config { engine: Some(Engine::Grid), ..base };
     match settings & 3 {
         0 => base,
         1 => grid,

@@ -1,23 +1,25 @@
-//! The update of few changed boxes: each is looked up in the tree where it is, and what it overlaps is compared with its kept pairs.
+//! The update of few changed boxes: each is looked up in the tree, and what it overlaps is compared with its kept pairs.
 
 use super::Task;
-use super::listed::Listed;
-use crate::broad_phase::world::World;
-use crate::grid::{BLOCK, Budget, Simd, dispatch};
-use crate::holder::Holder;
+use super::tree::Tree;
+use super::world::World;
+use crate::budget::Budget;
+use crate::grid::{BLOCK, Simd, dispatch};
 use crate::index::BoxIndex;
 use crate::memory::ShrinkingVec;
 use crate::outcome::{End, Outcome};
-use crate::pairs::{Kept, differences, equal};
+use crate::pairs::{Comparison, Kept, differences, equal, sort_few};
 use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy;
 use crate::report::{Clock, stage};
-use crate::{Algorithm, Checks, Pair, Plan};
+use crate::{Algorithm, Checks, Engine, Pair, Plan};
 
-/// The buffers of the engine.
+/// Boxes that a thread looks up before it tells the others its work.
+const CHARGED_TOGETHER: usize = 64;
+
+/// The buffers of the look-ups.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LookUp {
-    listed: Listed,
     /// Changed boxes in the order of the tree: place and id.
     order: Vec<u64>,
     threads: Vec<Thread>,
@@ -25,71 +27,75 @@ pub(super) struct LookUp {
 
 impl LookUp {
     /// Brings the tree up to date, and leaves the events of an update in the task. Gives up if it takes too much work.
-    pub(super) fn run(&mut self, task: &mut Task<'_>) -> Outcome {
-        stage!("tree");
-        let mut clock = Clock::start();
-        let world = task.world;
-        let mut outcome = Outcome { holder: Holder::Tree, ..Outcome::default() };
-        let refit = self.bring_up_to_date(task);
+    pub(super) fn run(&mut self, task: &mut Task<'_>, tree: &mut Tree) -> Outcome {
+        let (world, mut clock, mut outcome) = (task.world, Clock::start(), Outcome::default());
+        let (index, read) = {
+            stage!("map");
+            tree.follow(world)
+        };
+        index.in_order(&world.changed, &mut self.order);
+        task.kept.make_backward();
         outcome.stages.map = clock.lap();
-        let max_work = task.unless_forced(policy::look_up_to_nodes(world.present.len()));
-        let budget = Budget::new(max_work);
-        self.look_up(task, &budget);
-        outcome.stages.check = clock.lap();
+        stage!("check");
+        let is_forced = task.config.engine == Some(Engine::LookUp);
+        let most = if is_forced { u64::MAX } else { policy::look_up_to_nodes(world.present.len()) };
+        let budget = Budget::new(most);
+        self.look_up((world, task.kept, index), (&budget, task.config.limits.pairs()));
+        self.gather(task.events, world.ids());
         let sum = |of: fn(&Thread) -> u64| self.threads.iter().map(of).sum::<u64>();
         let (nodes, met) = (sum(|thread| thread.nodes), sum(|thread| thread.met));
-        let made = nodes * BLOCK as u64;
+        let made = index.note(nodes) * BLOCK as u64;
+        outcome.stages.check = clock.lap();
         outcome.checks = Checks { made, unnecessary: made - met, redundant: 0 };
-        outcome.work = refit + made + nodes + met;
-        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: world.valid, ..Plan::default() };
+        outcome.work = read as u64 + made + nodes + met;
+        outcome.plan = Plan { algorithm: Algorithm::LookUp, boxes: world.valid, ..Plan::default() };
         outcome.end = if budget.is_over() { End::GivenUp } else { End::Done };
         outcome
     }
 
-    /// Refits the tree along the changed boxes, or sorts it. Returns the work, in boxes.
-    fn bring_up_to_date(&mut self, task: &mut Task<'_>) -> u64 {
-        let (world, tree) = (task.world, &mut task.store.tree);
-        let is_current = task.holder == Holder::Tree;
-        if !(is_current && tree.follow(&world.boxes, &world.changed, &mut self.order)) {
-            self.listed.take(world);
-            tree.sort(&self.listed.boxes);
-            tree.rename(&self.listed.ids);
-            tree.in_order(&world.changed, &mut self.order);
-            return (world.changed.len() + self.listed.ids.len()) as u64;
-        }
-        world.changed.len() as u64
-    }
-
-    /// Looks the changed boxes up, and leaves the events. Some are missing if the budget does not suffice.
-    fn look_up(&mut self, task: &mut Task<'_>, budget: &Budget) {
-        let Task { world, kept, store, events, .. } = task;
+    /// Looks the changed boxes up. Some are left out if the budget does not suffice, or more pairs begin than there may be.
+    fn look_up(
+        &mut self,
+        (world, kept, index): (&World, &Kept, &BoxIndex),
+        (budget, most_added): (&Budget, u64),
+    ) {
         let changed = self.order.len();
-        let workers = if changed < policy::PARALLEL_FROM_EDITS { 1 } else { available_threads() };
+        let workers = if changed < policy::PARALLEL_FROM_CHANGES { 1 } else { available_threads() };
         self.threads.resize_with(workers.max(self.threads.len()), Thread::default);
         self.threads.iter_mut().for_each(Thread::clear);
-        kept.make_backward();
-        let (world, kept, tree, order) = (*world, &**kept, &store.tree, &self.order[..]);
         let pieces = if workers == 1 { 1 } else { 8 * workers };
+        let order = &self.order[..];
         run_with(&mut self.threads[..workers], pieces, |thread, piece| {
             let ids = &order[piece_range(changed, piece, pieces)];
             if !budget.is_over() {
-                dispatch!(Thread::look_up, thread, (world, kept, tree), ids, budget);
+                dispatch!(Thread::look_up, thread, (world, kept, index), ids, (budget, most_added));
             }
         });
+    }
+
+    /// Gathers the events of all threads.
+    fn gather(&self, events: &mut Comparison, ids: usize) {
         events.clear();
-        for thread in &mut self.threads {
+        for thread in &self.threads {
             events.added.extend_from_slice(&thread.added);
             events.removed.extend_from_slice(&thread.removed);
             events.dropped.extend_from_slice(&thread.dropped);
         }
-        events.sort(world.ids());
+        events.sort(ids);
+    }
+
+    /// Gives back memory that the events of the last run did not need.
+    pub(super) fn settle(&mut self) {
+        for Thread { added, removed, dropped, .. } in &mut self.threads {
+            [added, removed, dropped].into_iter().for_each(ShrinkingVec::settle_and_clear);
+        }
     }
 }
 
 /// The findings and buffers of one thread.
 #[derive(Clone, Debug, Default)]
 struct Thread {
-    /// Ids that the box at hand overlaps, and had as partners.
+    /// Ids that the box at hand overlaps, and those that it had as partners.
     now: Vec<u32>,
     was: Vec<u32>,
     added: ShrinkingVec<Pair>,
@@ -112,18 +118,21 @@ impl Thread {
     fn look_up(
         simd: impl Simd,
         thread: &mut Self,
-        (world, kept, tree): (&World, &Kept, &BoxIndex),
+        (world, kept, index): (&World, &Kept, &BoxIndex),
         ids: &[u64],
-        budget: &Budget,
+        (budget, most_added): (&Budget, u64),
     ) {
-        for words in ids.chunks(64) {
+        for words in ids.chunks(CHARGED_TOGETHER) {
             let before = thread.nodes + thread.met;
             for &word in words {
                 let id = word as u32;
                 thread.now.clear();
-                thread.nodes += tree.overlaps(simd, &world.boxes[id as usize], |other| thread.now.push(other));
+                thread.nodes += index.overlaps(simd, &world.boxes[id as usize], |other| thread.now.push(other));
                 thread.met += thread.now.len() as u64;
                 thread.compare(simd, world, kept, id);
+                if thread.added.len() as u64 > most_added {
+                    return;
+                }
             }
             budget.charge(thread.nodes + thread.met - before);
             if budget.is_over() {
@@ -136,10 +145,9 @@ impl Thread {
     #[inline(always)]
     fn compare(&mut self, simd: impl Simd, world: &World, kept: &Kept, id: u32) {
         let (lower, later) = kept.rows_of(id);
-        crate::pairs::sort_few(simd, &mut self.now);
+        sort_few(simd, &mut self.now);
         let at = self.now.partition_point(|other| *other < id);
-        let is_met = self.now.get(at) == Some(&id);
-        let behind = at + usize::from(is_met);
+        let behind = at + usize::from(self.now.get(at) == Some(&id));
         let is_same = equal(lower, &self.now[..at]) && equal(later, &self.now[behind..]);
         if !is_same || world.is_filtered || world.has_removed() {
             self.compare_all(world, (lower, later), id);
@@ -150,7 +158,7 @@ impl Thread {
     #[inline(never)]
     fn compare_all(&mut self, world: &World, (lower, later): (&[u32], &[u32]), id: u32) {
         let Self { now, was, added, removed, dropped, .. } = self;
-        let is_own = |other: u32| other > id || other < id && world.change_of(other).is_none();
+        let is_own = |other: u32| other > id || other < id && !world.has_changed(other);
         was.clear();
         was.extend(lower.iter().chain(later).copied().filter(|other| is_own(*other)));
         let filter = &world.filters[id as usize];

@@ -1,12 +1,12 @@
-//! Few boxes of many change: edits, shared by threads, against the oracle.
+//! Few boxes of many change: look-ups, shared by threads, against the oracle.
 
 use crate::follower::Follower;
-use pbig_core::{Aabb, Algorithm, Config, Engine, Error, Limits, Pair, ProxyFilter};
+use pbig_core::{Aabb, Algorithm, Config, Error, Limits, Pair, ProxyFilter};
 use pbig_tests::{on_threads, set, shifted};
 
 const BOXES: usize = 20_000;
 
-/// Boxes that change in a round: enough for threads to share edits.
+/// Boxes that change in a round: enough for threads to share look-ups.
 const CHANGED: usize = 1500;
 
 /// A limit below the pairs of all boxes in one place.
@@ -64,14 +64,14 @@ fn crowd_and_part(world: &mut Follower) {
 
 fn rounds() {
     let limits = Limits { max_pairs: LIMIT, ..Limits::DEFAULT };
-    let mut world = Follower::new(Config { engine: Some(Engine::Edit), limits, ..Config::DEFAULT }, BOXES);
+    let mut world = Follower::new(Config { limits, ..Config::DEFAULT }, BOXES);
     (0..).zip(set("pile", BOXES, 3)).for_each(|(id, aabb)| world.set(id, aabb, ProxyFilter::ALL));
     check(&mut world, "the first");
-    let (mut edits, mut parted) = (0, 0);
+    let (mut look_ups, mut parted) = (0, 0);
     for round in 0..12 {
         change(&mut world, round);
         parted += check(&mut world, &format!("round {round}"));
-        edits += usize::from(world.broad_phase.report().plan.algorithm == Algorithm::Edit);
+        look_ups += usize::from(world.broad_phase.report().plan.algorithm == Algorithm::LookUp);
     }
     crowd_and_part(&mut world);
     check(&mut world, "after an error");
@@ -79,11 +79,11 @@ fn rounds() {
     assert!(!world.broad_phase.events().removed.is_empty());
     change(&mut world, 13);
     parted += check(&mut world, "the last");
-    assert!(edits >= 12 && parted > 100, "{edits} edits, {parted} parted");
+    assert!(look_ups >= 12 && parted > 100, "{look_ups} look-ups, {parted} parted");
 }
 
 #[test]
-fn edits_make_the_events_of_a_full_search_on_any_threads() {
+fn look_ups_make_the_events_of_a_full_search_on_any_threads() {
     rounds();
     [1, 2, 3].into_iter().for_each(|threads| on_threads(threads, rounds));
 }

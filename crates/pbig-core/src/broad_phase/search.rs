@@ -1,0 +1,135 @@
+//! The update of many changed boxes: all boxes are searched, by the CPU or a device, and the pairs are compared with the kept ones.
+//! Where most ids have no box, the present boxes are listed first, and the search knows them by their places in the list.
+
+use super::Task;
+use super::tree::Tree;
+use super::world::World;
+use crate::all_pairs::{AllPairs, Request, Store};
+use crate::device_slot::DeviceSlot;
+use crate::outcome::{End, Outcome};
+use crate::pairs::{Grouping, Groups, Kept};
+use crate::policy;
+use crate::report::{Clock, stage};
+use crate::{Aabb, Algorithm, Boxes, Config, Pair, ProxyFilter};
+
+/// The buffers of a search.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Search {
+    store: Store,
+    all_pairs: AllPairs,
+    groups: Groups,
+    listed: Listed,
+}
+
+impl Search {
+    /// Leaves the events of an update in the task, or replaces the kept pairs by the found ones, too. Gives up, and leaves all as it
+    /// is, if it is given a device that could not find them.
+    pub(super) fn run(
+        &mut self,
+        task: &mut Task<'_>,
+        tree: &mut Tree,
+        device: Option<&mut DeviceSlot>,
+    ) -> Outcome {
+        let world = task.world;
+        let is_listed = policy::is_listed(world.present.len(), world.ids());
+        let (mut boxes, mut filters) = (&world.boxes, &world.filters);
+        if is_listed {
+            self.listed.take(world);
+            (boxes, filters) = (&self.listed.boxes, &self.listed.filters);
+        }
+        let all = Boxes { boxes, filters: world.is_filtered.then_some(&filters[..]), keys: None };
+        self.groups.may_repeat = device.is_some();
+        let parts = (&mut self.all_pairs, &mut self.store);
+        let mut outcome = search(parts, &all, task.config, device);
+        outcome.work += (boxes.len() - world.present.len()) as u64;
+        if outcome.end != End::Done {
+            return outcome;
+        }
+        if outcome.plan.algorithm == Algorithm::Tree && !is_listed {
+            tree.adopt(&mut self.store.tree);
+        }
+        let mut clock = Clock::start();
+        outcome.has_replaced_kept = self.compare(task, outcome.plan.algorithm, is_listed);
+        outcome.stages.diff = clock.lap();
+        outcome
+    }
+
+    /// Gives memory back if as many pairs are expected.
+    pub(super) fn settle(&mut self, pairs: usize) {
+        self.store.settle();
+        self.all_pairs.settle(pairs);
+        self.groups.settle(pairs);
+    }
+
+    /// Compares the found pairs with the kept ones. Returns true if it has replaced these.
+    fn compare(&mut self, task: &mut Task<'_>, algorithm: Algorithm, is_listed: bool) -> bool {
+        stage!("diff");
+        let world = task.world;
+        if world.has_removed() {
+            drop_pairs_of_removed(world, task.kept);
+        }
+        let names = is_listed.then_some(&self.listed.ids[..]);
+        if matches!(algorithm, Algorithm::Brute | Algorithm::Nothing) {
+            let name = |place: u32| names.map_or(place, |names| names[place as usize]);
+            let found = self.all_pairs.hits[0].pairs.iter().map(|pair| Pair { a: name(pair.a), b: name(pair.b) });
+            task.events.compare_sorted(world.present.iter(), found, task.kept);
+            return false;
+        }
+        let boxes = names.map_or(world.ids(), <[u32]>::len);
+        self.all_pairs.gather(Grouping::new(boxes), &mut self.groups);
+        if let Some(names) = names {
+            self.groups.rename_partners(names);
+        }
+        task.events.run((&mut self.groups, names), task.kept, AllPairs::workers(boxes));
+        true
+    }
+}
+
+/// Leaves the pairs of all boxes in `all_pairs`.
+fn search(
+    (all_pairs, store): (&mut AllPairs, &mut Store),
+    all: &Boxes<'_>,
+    config: &Config,
+    device: Option<&mut DeviceSlot>,
+) -> Outcome {
+    let grouping = Some(Grouping::new(all.boxes.len()));
+    match device {
+        Some(device) => all_pairs.find_on(device, all, config, grouping),
+        None => all_pairs.find(&Request { grouping, ..Request::of_one(all, config) }, store),
+    }
+}
+
+/// The ids of present boxes, in order, and what decides about their pairs: work on them follows the boxes that are left after a peak,
+/// not the ids.
+#[derive(Clone, Debug, Default)]
+struct Listed {
+    ids: Vec<u32>,
+    boxes: Vec<Aabb>,
+    /// Empty if no box of the world was ever filtered.
+    filters: Vec<ProxyFilter>,
+}
+
+impl Listed {
+    fn take(&mut self, world: &World) {
+        let Self { ids, boxes, filters } = self;
+        ids.clear();
+        ids.extend(world.present.iter());
+        boxes.clear();
+        boxes.extend(ids.iter().map(|id| world.boxes[*id as usize]));
+        filters.clear();
+        if world.is_filtered {
+            filters.extend(ids.iter().map(|id| world.filters[*id as usize]));
+        }
+    }
+}
+
+/// Drops the kept pairs of boxes that were removed since the last update. Boxes left after a peak are few, so it reads their rows only.
+fn drop_pairs_of_removed(world: &World, kept: &mut Kept) {
+    let absent = world.removed.iter().copied().filter(|id| !world.contains(*id));
+    let pairs = |a: u32| kept.later_partners(a).iter().map(move |&b| Pair { a, b });
+    let has_ended = |pair: &Pair| world.was_removed(pair.a) || world.was_removed(pair.b);
+    let all = world.present.iter().chain(absent).flat_map(pairs);
+    let mut dropped: Vec<Pair> = all.filter(has_ended).collect();
+    dropped.sort_unstable();
+    kept.apply(&[], &dropped);
+}

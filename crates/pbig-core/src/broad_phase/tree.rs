@@ -1,0 +1,146 @@
+//! The tree of the world's boxes, which look-ups and queries share. It is fresh or stale; who needs it makes it fresh. Without
+//! look-ups and queries it costs next to nothing.
+
+use super::world::World;
+use crate::BoxIndex;
+use crate::parallel::alone;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+/// A tree that knows all boxes, or all that may have changed since it did.
+#[derive(Debug, Default)]
+pub(super) struct Tree {
+    fresh: OnceLock<Fresh>,
+    stale: Mutex<Stale>,
+    /// A query has read the tree since the last update.
+    is_read: AtomicBool,
+}
+
+/// A tree of the boxes as they are, which queries read at once.
+#[derive(Debug, Default)]
+struct Fresh {
+    index: BoxIndex,
+    /// The same boxes in a better order, once queries have paid for it.
+    sorted: OnceLock<BoxIndex>,
+    /// Held by the query that sorts. The others go on with the tree as it is.
+    sorting: Mutex<()>,
+}
+
+/// A tree of boxes as they were.
+#[derive(Debug, Default)]
+struct Stale {
+    index: BoxIndex,
+    /// Ids of boxes that may have changed since, repeated or not, beside those that have changed since the last update.
+    changed: Vec<u32>,
+    /// False if `changed` was given up because it grew too long.
+    knows_changes: bool,
+}
+
+impl Clone for Tree {
+    /// Returns an empty tree: the clone makes its own when it needs one.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl Tree {
+    /// Says that a box is about to change.
+    #[inline(always)]
+    pub(super) fn expire(&mut self) {
+        if self.fresh.get_mut().is_some() {
+            self.make_stale();
+        }
+    }
+
+    #[cold]
+    fn make_stale(&mut self) {
+        if let Some(Fresh { index, sorted, .. }) = self.fresh.take() {
+            let index = sorted.into_inner().unwrap_or(index);
+            *self.stale_mut() = Stale { index, changed: Vec::new(), knows_changes: true };
+        }
+    }
+
+    fn stale_mut(&mut self) -> &mut Stale {
+        self.stale.get_mut().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Notes what has changed, before an update forgets it. Makes the tree fresh if queries have read it since the last update: here
+    /// threads share the work, which a query does alone.
+    pub(super) fn end_update(&mut self, world: &World) {
+        let is_read = std::mem::take(self.is_read.get_mut());
+        if self.fresh.get_mut().is_some() || world.changed.is_empty() {
+            return;
+        }
+        if is_read {
+            self.fresh = self.refreshed(world).into();
+            return;
+        }
+        let stale = self.stale_mut();
+        // A longer list saves nothing, because then all boxes are read.
+        stale.knows_changes &= stale.changed.len() + world.changed.len() <= world.present.len() / 8;
+        if stale.knows_changes {
+            stale.changed.extend_from_slice(&world.changed);
+        } else {
+            stale.changed.clear();
+        }
+    }
+
+    /// Returns the tree of the boxes as they are. The first query after a change brings it up to date, alone, because others may
+    /// wait for it.
+    #[inline(always)]
+    pub(super) fn get(&self, world: &World) -> &BoxIndex {
+        let fresh = self.fresh.get_or_init(|| alone(|| self.refreshed(world)));
+        if !self.is_read.load(Ordering::Relaxed) {
+            self.is_read.store(true, Ordering::Relaxed);
+        }
+        let index = fresh.sorted.get().unwrap_or(&fresh.index);
+        if index.wants_sort() { fresh.sort(world) } else { index }
+    }
+
+    /// Takes the stale tree, and brings it up to date.
+    #[cold]
+    fn refreshed(&self, world: &World) -> Fresh {
+        let stale = std::mem::take(&mut *self.stale.lock().unwrap_or_else(PoisonError::into_inner));
+        let Stale { mut index, mut changed, knows_changes } = stale;
+        changed.extend_from_slice(&world.changed);
+        index.renew(&world.boxes, knows_changes.then_some(&changed), world.present.iter());
+        Fresh { index, ..Fresh::default() }
+    }
+
+    /// Makes the tree fresh, with its boxes sorted, for look-ups of the changed ones. Returns it, and how many boxes were read.
+    pub(super) fn follow(&mut self, world: &World) -> (&BoxIndex, usize) {
+        self.make_stale();
+        let Stale { index, mut changed, knows_changes } = std::mem::take(self.stale_mut());
+        changed.extend_from_slice(&world.changed);
+        let mut fresh = Fresh { index, ..Fresh::default() };
+        let known = knows_changes.then_some(&changed[..]);
+        let read = fresh.index.follow(&world.boxes, known, world.present.iter());
+        (&self.fresh.get_or_init(|| fresh).index, read)
+    }
+
+    /// Takes over a tree that was sorted just now from all boxes. The one so far is left in its place, for its memory.
+    pub(super) fn adopt(&mut self, sorted: &mut BoxIndex) {
+        self.make_stale();
+        let index = std::mem::replace(sorted, std::mem::take(&mut self.stale_mut().index));
+        self.fresh = Fresh { index, ..Fresh::default() }.into();
+    }
+}
+
+impl Fresh {
+    /// Sorts the boxes for this and later queries, unless another query does it just now. Both orders are held until the boxes change.
+    #[cold]
+    fn sort(&self, world: &World) -> &BoxIndex {
+        let sort = || {
+            let mut index = BoxIndex::default();
+            index.sort_present(&world.boxes, world.present.iter());
+            index
+        };
+        match self.sorting.try_lock() {
+            Ok(_guard) => self.sorted.get_or_init(sort),
+            Err(_) => &self.index,
+        }
+    }
+}
+
+#[cfg(all(test, feature = "parallel"))]
+mod tests;
