@@ -4,6 +4,9 @@
 /// ten take half to nine tenths of the time of a search.
 const LOOK_UP_TO_ONE_IN: usize = 8;
 
+/// Minimum number of boxes for look-ups: all pairs of fewer are tested sooner than a tree is up to date.
+const LOOK_UP_FROM_BOXES: usize = 65;
+
 /// Maximum number of nodes looked at and boxes met in look-ups, for each box of the world. A node counts as nine in the work: look-ups
 /// that are given up take at most 64 more for each box than a search.
 const LOOK_UP_TO_NODES_PER_BOX: u64 = 7;
@@ -18,9 +21,9 @@ const MAX_SEARCHES: u32 = 64;
 /// Minimum number of changed boxes for look-ups on several threads.
 pub(crate) const PARALLEL_FROM_CHANGES: usize = 1024;
 
-/// Returns true if an update looks up the changed boxes. Of the fewest boxes all pairs are tested sooner than the tree is up to date.
+/// Returns true if an update looks up the changed boxes.
 pub(crate) fn may_look_up(boxes: usize, changed: usize) -> bool {
-    boxes > super::BRUTE_FORCE_UP_TO_BOXES && changed * LOOK_UP_TO_ONE_IN <= boxes
+    boxes >= LOOK_UP_FROM_BOXES && changed * LOOK_UP_TO_ONE_IN <= boxes
 }
 
 /// Look-ups that were given up because they took too much work. The next updates with as many changes search at once: one

@@ -16,8 +16,8 @@ pub(crate) use engine::{GivenUp, PARALLEL_FROM_CHANGES, is_listed, look_up_to_no
 /// Minimum number of boxes for a search on several threads. Waking a thread takes about as long as 16,384 boxes take alone.
 pub(crate) const PARALLEL_FROM_BOXES: usize = 16_384;
 
-/// Maximum number of boxes for a test of every pair: a grid takes longer.
-pub(crate) const BRUTE_FORCE_UP_TO_BOXES: usize = 64;
+/// Maximum number of boxes for a test of every pair, eight at a time: a grid takes longer.
+pub(crate) const BRUTE_FORCE_UP_TO_BOXES: usize = 400;
 
 /// Wanted number of boxes in a cell, where density and not size decides about cells.
 pub(crate) const BOXES_PER_CELL: f64 = 0.5;
