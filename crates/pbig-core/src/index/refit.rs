@@ -22,26 +22,29 @@ impl BoxIndex {
     pub fn refresh(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
         let gone = boxes.len() as u32..self.known as u32;
         if changed.is_none() || gone.is_empty() {
-            return self.renew(boxes, changed, 0..boxes.len() as u32);
+            self.renew(boxes, changed, 0..boxes.len() as u32);
+            return;
         }
         let changed: Vec<u32> = changed.unwrap_or_default().iter().copied().chain(gone).collect();
         self.renew(boxes, Some(&changed), 0..boxes.len() as u32);
     }
 
-    /// As [`BoxIndex::refresh`]; no id but the `present` ones has a box.
+    /// As [`BoxIndex::refresh`]; no id but the `present` ones has a box. Returns the number of boxes that were read.
     pub(crate) fn renew(
         &mut self,
         boxes: &[Aabb],
         changed: Option<&[u32]>,
         present: impl Iterator<Item = u32> + Clone,
-    ) {
-        self.read(boxes, changed, present.clone());
-        if self.is_bad() {
-            self.lay_out(boxes, present, self.has_earned_sort().then_some(u32::MAX));
+    ) -> usize {
+        let read = self.read(boxes, changed, present.clone());
+        if !self.is_bad() {
+            return read;
         }
+        self.lay_out(boxes, present, self.has_earned_sort().then_some(u32::MAX));
+        read + self.listed
     }
 
-    /// As [`BoxIndex::renew`], and leaves the boxes sorted. Returns the number of boxes that were read.
+    /// As [`BoxIndex::renew`], and leaves the boxes sorted.
     pub(crate) fn follow(
         &mut self,
         boxes: &[Aabb],
@@ -54,7 +57,7 @@ impl BoxIndex {
         }
         if !self.is_sorted || self.is_bad() {
             self.sort_present(boxes, present);
-            read += boxes.len();
+            read += self.listed;
         }
         read
     }

@@ -66,7 +66,9 @@ fn with_exponent(exponent: u8) -> f64 {
 /// cut.
 pub(super) fn sort(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
     let are_alike = |a: &Entry, b: &Entry| a.class(split) == b.class(split);
-    entries.sort_unstable_by_key(|entry| entry.class(split));
+    if !entries.windows(2).all(|two| are_alike(&two[0], &two[1])) {
+        entries.sort_unstable_by_key(|entry| entry.class(split));
+    }
     let (mut classes, mut samples, mut first) = (Vec::new(), Vec::new(), 0);
     for class in entries.chunk_by(are_alike) {
         classes.push(first..first + class.len());

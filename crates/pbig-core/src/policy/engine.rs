@@ -5,7 +5,7 @@
 const LOOK_UP_TO_ONE_IN: usize = 8;
 
 /// Minimum number of boxes for look-ups: all pairs of fewer are tested sooner than a tree is up to date.
-const LOOK_UP_FROM_BOXES: usize = 65;
+const LOOK_UP_FROM_BOXES: usize = 16;
 
 /// Maximum number of nodes looked at and boxes met in look-ups, for each box of the world. A node counts as nine in the work: look-ups
 /// that are given up take at most 64 more for each box than a search.
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn few_changes_are_looked_up() {
         assert!(may_look_up(800, 100) && !may_look_up(800, 101));
-        assert!(may_look_up(65, 1) && !may_look_up(64, 1));
+        assert!(may_look_up(16, 1) && !may_look_up(15, 1));
         assert_eq!(look_up_to_nodes(1000), 7000);
     }
 
