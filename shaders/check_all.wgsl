@@ -3,11 +3,10 @@
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
-@group(0) @binding(2) var<storage, read> boxes: array<KnownBox>;
-@group(0) @binding(3) var<storage, read> changed: array<u32>;
-@group(0) @binding(4) var<storage, read> filters: array<vec4<u32>>;
-@group(0) @binding(5) var<storage, read_write> totals: array<atomic<u32>, 12>;
-@group(0) @binding(6) var<storage, read_write> out: array<u32>;
+@group(0) @binding(2) var<storage, read> boxes: array<DeviceBox>;
+@group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read_write> totals: array<atomic<u32>, 12>;
+@group(0) @binding(5) var<storage, read_write> out: array<u32>;
 
 var<workgroup> bits: array<atomic<u32>, 8>;
 
@@ -24,13 +23,9 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     }
     var hit = false;
     var pair = vec2<u32>(0u);
-    var mark = 0u;
     if first + lane < all {
         pair = pair_at(first + lane, n);
-        let one = known_box(pair.x);
-        let other = known_box(pair.y);
-        let found = is_wanted(one, other);
-        mark = mark_of(one, other);
+        let found = overlap(ordered_box(boxes[pair.x]), ordered_box(boxes[pair.y]));
         note_test(2u, u32(found));
         hit = found && (!has_flag(FILTERED) || filters_allow(filters[pair.x], filters[pair.y]));
     }
@@ -59,6 +54,6 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         out[word] = atomicLoad(&bits[lane]);
     }
     if hit && at != NO_SPACE {
-        write_pair(at + 2u * rank, pair.x, pair.y, mark);
+        write_pair(at + 2u * rank, pair.x, pair.y);
     }
 }

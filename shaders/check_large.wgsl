@@ -3,7 +3,7 @@
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
-@group(0) @binding(2) var<storage, read> boxes: array<KnownBox>;
+@group(0) @binding(2) var<storage, read> boxes: array<DeviceBox>;
 @group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read> entries: array<u32>;
 @group(0) @binding(5) var<storage, read> counters: Counters;
@@ -15,11 +15,10 @@
 override BALANCED: bool = true;
 
 // The staged segment: usually the columns.
-var<workgroup> staged_boxes: array<KnownBox, LANES>;
+var<workgroup> staged_boxes: array<DeviceBox, LANES>;
 var<workgroup> staged_entries: array<u32, LANES>;
 // All marks of the item's entries. If the mark of an axis is missing, the cell owns none of the item's pairs, and the item
-// is skipped. For many boxes across one border of cells this skips 7 of 8 cells. A search for changes also skips items
-// without a moved box.
+// is skipped. For many boxes across one border of cells this skips 7 of 8 cells.
 var<workgroup> marks: atomic<u32>;
 var<workgroup> skip: u32;
 
@@ -91,7 +90,7 @@ fn stage(item: LargeItem, lane: u32, s: Segments) -> u32 {
     if lane < select(s.boxes, s.residents, s.is_swapped) {
         let entry = entries[item.start + other];
         staged_entries[lane] = entry;
-        staged_boxes[lane] = checked_box(boxes[box_of(entry)]);
+        staged_boxes[lane] = ordered_box(boxes[box_of(entry)]);
     }
     var entry = 0u;
     if own < item.boxes {
@@ -102,7 +101,7 @@ fn stage(item: LargeItem, lane: u32, s: Segments) -> u32 {
 }
 
 // Tests a lane's box against its partners. Returns the number of hits.
-fn test_partners(lane: u32, entry: u32, one: KnownBox, s: Segments) -> u32 {
+fn test_partners(lane: u32, entry: u32, one: DeviceBox, s: Segments) -> u32 {
     let length = partners(lane, s);
     var counts = vec3<u32>(0u);
     var hits = 0u;
@@ -117,12 +116,12 @@ fn test_partners(lane: u32, entry: u32, one: KnownBox, s: Segments) -> u32 {
             counts.x += 1u;
             let a = box_of(entry);
             let b = box_of(staged_entries[j]);
-            if !owns(entry, staged_entries[j]) || !may_be_wanted(entry | staged_entries[j])
+            if !owns(entry, staged_entries[j])
                 || (params.split > 0u && (a < params.split) == (b < params.split)) {
                 counts.y += 1u;
                 continue;
             }
-            if !is_wanted(one, staged_boxes[j]) {
+            if !overlap(one, staged_boxes[j]) {
                 continue;
             }
             counts.z += 1u;
@@ -184,7 +183,7 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     workgroupBarrier();
     if lane == 0u {
         let all = atomicLoad(&marks);
-        skip = u32(!owns(all, 0u) || !may_be_wanted(all));
+        skip = u32(!owns(all, 0u));
     }
     if workgroupUniformLoad(&skip) != 0u {
         return;
@@ -193,7 +192,7 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         workgroupBarrier();
         let s = segments(item, column);
         let entry = stage(item, lane, s);
-        let one = checked_box(boxes[box_of(entry)]);
+        let one = ordered_box(boxes[box_of(entry)]);
         let hits = test_partners(lane, entry, one, s);
         // Words of a row: its index, its number of hits less one, and a byte for each hit.
         let words = select(0u, (hits + 5u) / 4u, hits > 0u);
@@ -215,20 +214,19 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
             write_row(to.at + word_rank, lane, hits, s);
         }
         if written && to.packed == 0u {
-            write_pairs(to.at + 2u * rank, lane, entry, one, s);
+            write_pairs(to.at + 2u * rank, lane, entry, s);
         }
     }
 }
 
-fn write_pairs(start: u32, lane: u32, entry: u32, one: KnownBox, s: Segments) {
+fn write_pairs(start: u32, lane: u32, entry: u32, s: Segments) {
     var at = start;
     for (var w = 0u; w < 8u; w++) {
         var bits = mask[w];
         while bits != 0u {
             let k = 32u * w + firstTrailingBit(bits);
             bits &= bits - 1u;
-            let j = partner(lane, k, s);
-            write_pair(at, box_of(entry), box_of(staged_entries[j]), mark_of(one, staged_boxes[j]));
+            write_pair(at, box_of(entry), box_of(staged_entries[partner(lane, k, s)]));
             at += 2u;
         }
     }

@@ -4,7 +4,7 @@
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
-@group(0) @binding(2) var<storage, read> boxes: array<KnownBox>;
+@group(0) @binding(2) var<storage, read> boxes: array<DeviceBox>;
 @group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read> entries: array<u32>;
 @group(0) @binding(5) var<storage, read> counters: Counters;
@@ -33,9 +33,12 @@ fn slot_of(pair: u32, count: u32) -> u32 {
     return low;
 }
 
+// Number of boxes of small cells that fit workgroup memory.
+const STAGED = 256u;
+
 // The entries and boxes of the item's cells, if they are at most STAGED.
 var<workgroup> staged_entries: array<u32, STAGED>;
-var<workgroup> staged_boxes: array<KnownBox, STAGED>;
+var<workgroup> staged_boxes: array<DeviceBox, STAGED>;
 
 // A range of entries, and true if it is staged.
 struct Stage {
@@ -51,7 +54,7 @@ fn stage(item: SmallItem, lane: u32) -> Stage {
     if len <= STAGED && lane < len {
         let entry = entries[start + lane];
         staged_entries[lane] = entry;
-        staged_boxes[lane] = checked_box(boxes[box_of(entry)]);
+        staged_boxes[lane] = ordered_box(boxes[box_of(entry)]);
     }
     return Stage(start, len <= STAGED);
 }
@@ -63,15 +66,12 @@ fn entry_at(place: u32, staged: Stage) -> u32 {
     return entries[place];
 }
 
-fn box_at(place: u32, staged: Stage) -> KnownBox {
+fn box_at(place: u32, staged: Stage) -> DeviceBox {
     if staged.is_used {
         return staged_boxes[place - staged.start];
     }
-    return checked_box(boxes[box_of(entries[place])]);
+    return ordered_box(boxes[box_of(entries[place])]);
 }
-
-// The mark of the lane's hit.
-var<private> mark: u32;
 
 // Tests the pair of two entries, cheapest test first, and counts for the report.
 fn is_pair(one: u32, other: u32, staged: Stage) -> bool {
@@ -79,15 +79,14 @@ fn is_pair(one: u32, other: u32, staged: Stage) -> bool {
     let b = entry_at(other, staged);
     let i = box_of(a);
     let j = box_of(b);
-    if !owns(a, b) || !may_be_wanted(a | b) || (params.split > 0u && (i < params.split) == (j < params.split)) {
+    if !owns(a, b) || (params.split > 0u && (i < params.split) == (j < params.split)) {
         note_test(1u, 1u);
         return false;
     }
-    if !is_wanted(box_at(one, staged), box_at(other, staged)) {
+    if !overlap(box_at(one, staged), box_at(other, staged)) {
         return false;
     }
     note_test(2u, 1u);
-    mark = mark_of(box_at(one, staged), box_at(other, staged));
     return !has_flag(FILTERED) || filters_allow(filters[i], filters[j]);
 }
 
@@ -160,7 +159,7 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     if to.packed == 0u {
         let a = entry_at(start + pair.x, staged);
         let b = entry_at(start + pair.y, staged);
-        write_pair(to.at + 2u * rank, box_of(a), box_of(b), mark);
+        write_pair(to.at + 2u * rank, box_of(a), box_of(b));
         return;
     }
     let record = to.at + slot_at[slot];

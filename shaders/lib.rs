@@ -7,7 +7,7 @@
 //! ```
 //! let locate = pbig_shaders::LOCATE;
 //! assert_eq!(locate.name, "locate");
-//! assert!(locate.source(false).contains("fn locate("));
+//! assert!(locate.source().contains("fn locate("));
 //! ```
 
 /// Runs the program in the README as a test.
@@ -22,16 +22,10 @@ pub enum Buffer {
     Params,
     /// The range of work items of a submission.
     Chunk,
-    /// Boxes; in a search for changes also as they were at the last update.
+    /// Boxes.
     Boxes,
     /// Filters of the boxes.
     Filters,
-    /// Boxes that have changed since the last update.
-    BoxChanges,
-    /// Filters that have changed since the last update.
-    FilterChanges,
-    /// A bit for each box: it has changed since the last update.
-    Changed,
     /// Cells and level of each box.
     Located,
     /// Entries of each cell: counts, then ends of its lists, then their starts.
@@ -73,9 +67,6 @@ impl Buffer {
             Self::Chunk => "chunk",
             Self::Boxes => "boxes",
             Self::Filters => "filters",
-            Self::BoxChanges => "box_changes",
-            Self::FilterChanges => "filter_changes",
-            Self::Changed => "changed",
             Self::Located => "located",
             Self::Cells => "cells",
             Self::Sums => "sums",
@@ -125,25 +116,15 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Returns the whole WGSL text, for a search for changes or for all overlaps.
-    pub fn source(&self, changes: bool) -> String {
-        let part = |&part: &&'static str| match part {
-            SEARCH_OVERLAPS if changes => SEARCH_CHANGES,
-            part => part,
-        };
-        let parts = self.parts.iter().map(part);
+    /// Returns the whole WGSL text.
+    pub fn source(&self) -> String {
+        let parts = self.parts.iter().copied();
         [TYPES].into_iter().chain(parts).chain([self.body]).collect::<Vec<_>>().join("\n")
-    }
-
-    /// Returns true if a search for changes has a text of its own.
-    pub fn depends_on_search(&self) -> bool {
-        self.parts.contains(&SEARCH_OVERLAPS)
     }
 }
 
 const TYPES: &str = include_str!("shared/types.wgsl");
 const FLOATS: &str = include_str!("shared/floats.wgsl");
-const KNOWN_BOX: &str = include_str!("shared/known_box.wgsl");
 const CELLS: &str = include_str!("shared/cells.wgsl");
 const SCANNED: &str = include_str!("shared/scanned.wgsl");
 const ENDS: &str = include_str!("shared/ends.wgsl");
@@ -153,8 +134,6 @@ const LEADERS: &str = include_str!("shared/leaders.wgsl");
 const PIECES: &str = include_str!("shared/pieces.wgsl");
 const BLOCK_SCAN: &str = include_str!("shared/block_scan.wgsl");
 const PAIR_INDEX: &str = include_str!("shared/pair_index.wgsl");
-const SEARCH_OVERLAPS: &str = include_str!("shared/search_overlaps.wgsl");
-const SEARCH_CHANGES: &str = include_str!("shared/search_changes.wgsl");
 const EMIT: &str = include_str!("shared/emit.wgsl");
 
 /// Declares kernels, each once, and [`KERNELS`].
@@ -175,11 +154,8 @@ macro_rules! kernels {
 }
 
 kernels! {
-    /// Changes: applies the changes of boxes and filters.
-    APPLY_CHANGES Map "apply_changes" [] (Params, BoxChanges, FilterChanges, Boxes, Filters, Changed);
     /// Map: computes the cells and the level of each box, and counts the residents of each cell.
-    LOCATE Map "locate" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX, CELLS]
-        (Params, Boxes, Changed, Located, Cells, Counters);
+    LOCATE Map "locate" [FLOATS, CELLS] (Params, Boxes, Located, Cells, Counters);
     /// Map: counts the visitors of each cell.
     VISIT Map "visit" [CELLS] (Params, Located, Cells);
     /// Scan: computes prefix sums within blocks of lists.
@@ -193,14 +169,13 @@ kernels! {
     /// Schedule: computes the sizes of the dispatches that follow.
     ARRANGE Map "arrange" [DISPATCH] (Params, Chunk, Counters, Dispatches);
     /// Check: tests the pairs of small cells.
-    CHECK_SMALL Check "check_small" [FLOATS, SEARCH_OVERLAPS, BLOCK_SCAN, PAIR_INDEX, EMIT]
+    CHECK_SMALL Check "check_small" [FLOATS, BLOCK_SCAN, PAIR_INDEX, EMIT]
         (Params, Chunk, Boxes, Filters, Entries, Counters, Slots, SmallItems, Totals, Out);
     /// Check: tests the pairs of large cells.
-    CHECK_LARGE Check "check_large" [FLOATS, SEARCH_OVERLAPS, EMIT]
+    CHECK_LARGE Check "check_large" [FLOATS, EMIT]
         (Params, Chunk, Boxes, Filters, Entries, Counters, LargeItems, Totals, Out);
     /// Check: tests all pairs, without a grid.
-    CHECK_ALL Check "check_all" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX, PAIR_INDEX, EMIT]
-        (Params, Chunk, Boxes, Changed, Filters, Totals, Out);
+    CHECK_ALL Check "check_all" [FLOATS, PAIR_INDEX, EMIT] (Params, Chunk, Boxes, Filters, Totals, Out);
     /// Sort: computes the sizes of the dispatches that follow.
     ARRANGE_ROWS Sort "arrange_rows" [ROWS, DISPATCH] (Params, Chunk, Counters, Totals, Dispatches, LongRows);
     /// Sort: counts the pairs of each first box.

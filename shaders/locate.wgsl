@@ -1,13 +1,12 @@
 // Map, step 1 (PBIG 4.2, count): computes the cells that each box touches and its level. Counts the residents of each
-// cell: boxes of the cell's own level. Counts the valid boxes. In a search for changes, renews stale boxes.
+// cell: boxes of the cell's own level. Counts the valid boxes.
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read_write> boxes: array<KnownBox>;
-@group(0) @binding(2) var<storage, read> changed: array<u32>;
-@group(0) @binding(3) var<storage, read_write> located: array<Located>;
-@group(0) @binding(4) var<storage, read_write> cells: array<atomic<u32>>;
+@group(0) @binding(1) var<storage, read> boxes: array<DeviceBox>;
+@group(0) @binding(2) var<storage, read_write> located: array<Located>;
+@group(0) @binding(3) var<storage, read_write> cells: array<atomic<u32>>;
 // Counters, as atomics.
-@group(0) @binding(5) var<storage, read_write> counters: array<atomic<u32>, 8>;
+@group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>, 8>;
 
 const VALID = 4u;
 
@@ -69,11 +68,7 @@ fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
 }
 
 fn locate_one(id: u32) {
-    let known = known_box(id);
-    if is_stale(boxes[id], has_changed(id)) {
-        boxes[id] = known;
-    }
-    let one = bounds_of(known);
+    let one = ordered_box(boxes[id]);
     if one.low[0] > one.high[0] {
         located[id].shape = NO_LEVEL;
         return;
@@ -86,8 +81,7 @@ fn locate_one(id: u32) {
         high[axis] = finest_cell(one.high[axis]);
     }
     let level = level_of(low, high);
-    var at = located_at(low, high, level);
-    at.shape |= select(0u, MOVED, has_moved(known));
+    let at = located_at(low, high, level);
     located[id] = at;
     let t = touched(at, level);
     for (var k = 0u; k < cell_count(t); k++) {

@@ -11,7 +11,7 @@
 var<workgroup> members: array<atomic<u32>, LANES>;
 var<workgroup> places: array<u32, LANES>;
 
-fn marked_second(i: u32) -> u32 {
+fn second_of(i: u32) -> u32 {
     return grouped[2u * i + 1u];
 }
 
@@ -38,7 +38,7 @@ fn place_windows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         let start = before + block_scan(pairs_of_window(piece.start, base + lane), lane);
         before += block_sum();
         for (var i = first; i < end; i += LANES) {
-            let window = second_of(marked_second(i)) / WINDOW - base;
+            let window = second_of(i) / WINDOW - base;
             if window < LANES {
                 atomicAdd(&members[window], 1u);
             }
@@ -47,10 +47,10 @@ fn place_windows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         reserve(piece.start, base + lane, start, lane);
         workgroupBarrier();
         for (var i = first; i < end; i += LANES) {
-            let word = marked_second(i);
-            let window = second_of(word) / WINDOW - base;
+            let second = second_of(i);
+            let window = second / WINDOW - base;
             if window < LANES {
-                out[2u * (places[window] + atomicAdd(&members[window], 1u)) + 1u] = word;
+                out[2u * (places[window] + atomicAdd(&members[window], 1u)) + 1u] = second;
             }
         }
         workgroupBarrier();

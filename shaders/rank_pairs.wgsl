@@ -39,7 +39,7 @@ fn rank_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     let start = rows[first] + block_start(first);
     let end = end_of(first);
     if end - start > SHORT_ROW {
-        atomicAdd(&windows[window_at(start, second_of(second) / WINDOW)], 1u);
+        atomicAdd(&windows[window_at(start, second / WINDOW)], 1u);
         if (i - start) % PIECE == 0u {
             add_piece(start, end, (i - start) / PIECE);
         }
@@ -47,7 +47,7 @@ fn rank_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     }
     var at = start;
     for (var k = start; k < end; k++) {
-        at += u32(second_of(grouped[2u * k + 1u]) < second_of(second));
+        at += u32(grouped[2u * k + 1u] < second);
     }
     out[2u * at] = first;
     out[2u * at + 1u] = second;

@@ -10,7 +10,6 @@ const WORDS = 1024u;
 const WORDS_PER_LANE = 4u;
 
 var<workgroup> found: array<atomic<u32>, WORDS>;
-var<workgroup> ended: array<atomic<u32>, WORDS>;
 // Start and number of pairs of each window.
 var<workgroup> starts: array<u32, LANES>;
 var<workgroup> counts: array<u32, LANES>;
@@ -23,7 +22,6 @@ fn rank_windows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     }
     for (var word = lane; word < WORDS; word += LANES) {
         atomicStore(&found[word], 0u);
-        atomicStore(&ended[word], 0u);
     }
     let piece = piece_at(index);
     let pieces = (piece.end - piece.start + PIECE - 1u) / PIECE;
@@ -49,10 +47,8 @@ fn rank_windows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
 // Sets the bits of a window's pairs.
 fn note(start: u32, count: u32, lane: u32) {
     for (var i = start + lane; i < start + count; i += LANES) {
-        let word = out[2u * i + 1u];
-        let bit = second_of(word) % WINDOW;
+        let bit = out[2u * i + 1u] % WINDOW;
         atomicOr(&found[bit / 32u], 1u << (bit % 32u));
-        atomicOr(&ended[bit / 32u], (word >> 31u) << (bit % 32u));
     }
     storageBarrier();
     workgroupBarrier();
@@ -69,12 +65,11 @@ fn write(row: u32, start: u32, window: u32, lane: u32) {
     for (var i = 0u; i < WORDS_PER_LANE; i++) {
         let word = lane * WORDS_PER_LANE + i;
         var bits = atomicExchange(&found[word], 0u);
-        let marks = atomicExchange(&ended[word], 0u);
         while bits != 0u {
             let bit = firstTrailingBit(bits);
             bits &= bits - 1u;
             out[2u * at] = first;
-            out[2u * at + 1u] = (window * WINDOW + 32u * word + bit) | (((marks >> bit) & 1u) << 31u);
+            out[2u * at + 1u] = window * WINDOW + 32u * word + bit;
             at += 1u;
         }
     }

@@ -46,19 +46,18 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     let end = workgroupUniformLoad(&last_end);
     if visits_last {
         // The only cell is the lowest of every box, on all axes.
-        entries[end - 1u - rank] = id | (located[id].shape & MOVED) | (7u << AXIS_BITS);
+        entries[end - 1u - rank] = id | (7u << AXIS_BITS);
     }
 }
 
 // Writes a box into its own level and into the levels between that and the last.
 fn place_all(id: u32, at: Located, last: u32) {
     let own = own_level(at);
-    let name = id | (at.shape & MOVED);
     for (var level = own; level == own || level < last; level++) {
         let t = touched(at, level);
         for (var k = 0u; k < cell_count(t); k++) {
             let cell = cell_at(t, k, level);
-            place(cell.x, name | cell.y, level == own);
+            place(cell.x, id | cell.y, level == own);
         }
     }
 }

@@ -111,8 +111,7 @@ fn place_plain(hits: u32) -> Placed {
     return Placed(select(at + mark, NO_SPACE, at == NO_SPACE), hits, 2u * hits, 0u);
 }
 
-// Writes a pair. `mark` tells an update's ended pairs from its new ones.
-fn write_pair(at: u32, a: u32, b: u32, mark: u32) {
+fn write_pair(at: u32, a: u32, b: u32) {
     out[at] = min(a, b);
-    out[at + 1u] = max(a, b) | mark;
+    out[at + 1u] = max(a, b);
 }

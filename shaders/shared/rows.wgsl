@@ -11,11 +11,6 @@ const PIECE = 4096u;
 const PIECES = 3u;
 const FIRST_PIECE = 4u;
 
-// Returns a second box without the mark.
-fn second_of(word: u32) -> u32 {
-    return word & ~ENDED;
-}
-
 fn window_count() -> u32 {
     return (params.boxes + WINDOW - 1u) / WINDOW;
 }

@@ -30,33 +30,11 @@ const NOWHERE = DeviceBox(
     array<i32, 3>(-0x7fffffff - 1, -0x7fffffff - 1, -0x7fffffff - 1),
 );
 
-// A box now and at the last update. Unless Params says that the box has changed, `before` may be older.
-struct Motion {
-    now: DeviceBox,
-    before: DeviceBox,
-}
-
-// A changed box: its id, with WAS_ABSENT if it overlapped nothing at the last update, and the box now.
-struct BoxChange {
-    marked_id: u32,
-    now: DeviceBox,
-}
-
-// A changed filter: the id of its box, and the filter now.
-struct FilterChange {
-    id: u32,
-    filter0: u32,
-    filter1: u32,
-    filter2: u32,
-    filter3: u32,
-}
-
 // Cells that a box touches at its level.
 struct Located {
     // The lowest on each axis, not wrapped around.
     low: array<i32, 3>,
-    // The level, from SPAN_BITS on two bits an axis for the number of cells less one, and MOVED if the box has changed.
-    // NO_LEVEL for an invalid box.
+    // The level, and from SPAN_BITS on two bits an axis for the number of cells less one. NO_LEVEL for an invalid box.
     shape: u32,
 }
 
@@ -92,16 +70,11 @@ struct Params {
     slot_capacity: u32,
     small_capacity: u32,
     large_capacity: u32,
-    // Number of boxes that the device has from the last update, and lengths of the lists of changes.
-    known: u32,
-    box_changes: u32,
-    filter_changes: u32,
     // Number of pairs that can be sorted.
     pair_capacity: u32,
     // Counters.tests beyond which nothing is checked: the grid was made for other boxes.
     most_tests: u32,
-    unused0: u32,
-    unused1: u32,
+    unused: u32,
     level: array<Level, MAX_LEVELS>,
 }
 
@@ -180,14 +153,9 @@ struct Totals {
     unused: u32,
 }
 
-// Bits of an entry of a cell: the box, MOVED, and for each axis a bit that is set if this is the box's lowest cell there.
+// Bits of an entry of a cell: the box, an unused bit, and for each axis a bit that is set if this is the box's lowest cell there.
 const BOX_BITS = 28u;
 const AXIS_BITS = 29u;
-const MOVED = 1u << BOX_BITS;
-// Bit of the second id of a pair of output: the boxes overlapped at the last update, and no longer do.
-const ENDED = 0x80000000u;
-// Bit of BoxChange.marked_id: at the last update the box overlapped nothing.
-const WAS_ABSENT = 0x80000000u;
 
 fn box_of(entry: u32) -> u32 {
     return entry & ((1u << BOX_BITS) - 1u);

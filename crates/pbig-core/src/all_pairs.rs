@@ -1,19 +1,20 @@
 //! All pairs of a list of boxes, or those of two sets: by grids, by a tree where a grid would test too many, or by testing every
 //! pair of a few.
 
+use crate::device_slot::DeviceSlot;
 use crate::grid::{
     ById, EditedGrid, GridPlan, Hits, Receiver, Rule, Sorted, TwoGrids, brute_force, brute_force_across,
 };
 use crate::holder::Holder;
 use crate::index::BoxIndex;
-use crate::memory::Scratch;
+use crate::memory::{Scratch, ShrinkingVec};
 use crate::outcome::{End, Outcome};
 use crate::pairs::{Grouping, Groups};
-use crate::parallel::available_threads;
+use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
 use crate::report::{Checks, Clock, stage};
 use crate::streamed;
-use crate::{Aabb, Algorithm, Backend, Boxes, Config, Engine, Keys, Pair, Plan, ProxyFilter};
+use crate::{Aabb, Algorithm, Backend, Boxes, Config, Engine, Keys, Pair, Plan, ProxyFilter, SearchRequest};
 use std::sync::atomic::AtomicU64;
 
 /// A search: boxes, filters and settings.
@@ -99,7 +100,7 @@ impl Store {
         match holder {
             Holder::Grid => self.grid.rename(names),
             Holder::Tree => self.tree.rename(names),
-            Holder::Nothing | Holder::Lanes | Holder::Device => {}
+            Holder::Nothing | Holder::Lanes => {}
         }
     }
 }
@@ -108,6 +109,8 @@ impl Store {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AllPairs {
     pub(crate) hits: Vec<Hits>,
+    /// Memory for the answer of a device.
+    answer: ShrinkingVec<Pair>,
 }
 
 impl AllPairs {
@@ -260,13 +263,41 @@ impl AllPairs {
     pub(crate) fn settle(&mut self, pairs: usize) {
         let share = pairs / self.hits.len().max(1);
         self.hits.iter_mut().for_each(|hits| hits.settle(share));
+        self.answer.clear();
+        self.answer.settle(pairs);
     }
 
-    /// Takes pairs that a device has found.
-    pub(crate) fn take(&mut self, pairs: Vec<Pair>, grouping: Option<Grouping>) {
-        self.hits.resize_with(1, Hits::default);
-        self.hits[0].begin_for(grouping);
-        self.hits[0].take(pairs);
+    /// Leaves the pairs that a device finds in `hits`. Gives up if it could not find them.
+    pub(crate) fn find_on(
+        &mut self,
+        device: &mut DeviceSlot,
+        all: &Boxes<'_>,
+        config: &Config,
+        grouping: Option<Grouping>,
+    ) -> Outcome {
+        let Boxes { boxes, filters, .. } = *all;
+        let max_pairs = config.limits.pairs();
+        // Rows are sorted later, by several threads.
+        let request = SearchRequest { boxes, filters, is_sorted: false, max_pairs };
+        let (outcome, mut found) = device.find_all(&request, std::mem::take(&mut self.answer));
+        if outcome.end == End::Done {
+            self.take(&mut found, grouping);
+        }
+        *self.answer = found;
+        outcome
+    }
+
+    /// Takes pairs that a device has found. Several threads copy and count them.
+    pub(crate) fn take(&mut self, pairs: &mut Vec<Pair>, grouping: Option<Grouping>) {
+        self.hits.resize_with(Self::workers(pairs.len()), Hits::default);
+        self.hits.iter_mut().for_each(|hits| hits.begin_for(grouping));
+        if let [hits] = &mut self.hits[..] {
+            return hits.take(pairs);
+        }
+        let pieces = pairs.len().div_ceil(PARALLEL_FROM_BOXES);
+        run_with(&mut self.hits, pieces, |hits, piece| {
+            hits.add(&pairs[piece_range(pairs.len(), piece, pieces)]);
+        });
     }
 
     /// Copies all pairs into one list, in no particular order.

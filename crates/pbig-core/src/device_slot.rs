@@ -1,7 +1,7 @@
 //! The device of a finder or a broad phase, if it has one, and the report of a device that cannot do the work.
 
 use crate::outcome::{End, Outcome};
-use crate::pair_device::{ChangedBox, DeviceFailure, DeviceFound, PairDevice};
+use crate::pair_device::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 use crate::policy::{Choice, Work, choose_backend};
 use crate::report::{Clock, Report, StageTimes, stage};
 use crate::{Algorithm, Config, Pair, Plan, parallel};
@@ -10,20 +10,11 @@ use std::time::Duration;
 /// Pairs of an answer that a thread checks at a time.
 const PIECE: usize = 1 << 16;
 
-/// Room for a device.
-#[derive(Debug, Default)]
+/// Room for a device. A clone has a device of its own.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct DeviceSlot {
     device: Option<Box<dyn PairDevice>>,
     has_warned: bool,
-    /// Memory for the changes of an update.
-    pub(crate) changed: Vec<ChangedBox>,
-}
-
-/// A copy has a device of its own, and no memory yet.
-impl Clone for DeviceSlot {
-    fn clone(&self) -> Self {
-        Self { device: self.device.clone(), has_warned: self.has_warned, changed: Vec::new() }
-    }
 }
 
 impl DeviceSlot {
@@ -32,21 +23,9 @@ impl DeviceSlot {
         Self { device: Some(device), ..Self::default() }
     }
 
-    /// Returns true if there is a device.
-    pub(crate) fn has_device(&self) -> bool {
-        self.device.is_some()
-    }
-
     /// Returns the name of the device, unless there is none or it does not work.
     pub(crate) fn name(&self) -> Option<&str> {
         self.device.as_ref()?.name()
-    }
-
-    /// Lets the device forget the boxes of the last update.
-    pub(crate) fn forget(&mut self) {
-        if let Some(device) = &mut self.device {
-            device.forget();
-        }
     }
 
     /// Returns true if a call should run on the device. Otherwise the report gets the reason.
@@ -69,18 +48,17 @@ impl DeviceSlot {
         why
     }
 
-    /// Runs a call about this number of boxes on the device, with the memory of `pairs`. Gives up if the device could not do it.
-    pub(crate) fn call(
+    /// Finds all pairs on the device, with the memory of `pairs`, and returns them. Gives up if the device could not do it.
+    pub(crate) fn find_all(
         &mut self,
-        boxes: usize,
-        pairs: Vec<Pair>,
-        call: impl FnOnce(&mut dyn PairDevice, &mut DeviceFound) -> Result<(), DeviceFailure>,
-    ) -> (Outcome, DeviceFound) {
+        request: &SearchRequest<'_>,
+        mut pairs: Vec<Pair>,
+    ) -> (Outcome, Vec<Pair>) {
         stage!("device");
+        pairs.clear();
         let (mut clock, mut found) = (Clock::start(), DeviceFound { pairs, ..DeviceFound::default() });
-        found.pairs.clear();
-        let Some(device) = &mut self.device else { return (Outcome::default(), found) };
-        let outcome = match call(&mut **device, &mut found).and_then(|()| check(&found, boxes)) {
+        let Some(device) = &mut self.device else { return (Outcome::default(), found.pairs) };
+        let outcome = match device.find_all(request, &mut found).and_then(|()| check(&found, request)) {
             Ok(()) => {
                 self.has_warned = false;
                 found.report.name = self.name().unwrap_or_default().to_owned();
@@ -94,7 +72,7 @@ impl DeviceSlot {
                 Outcome { fallback: Some(self.fall_back(&why)), ..Outcome::default() }
             }
         };
-        (outcome, found)
+        (outcome, found.pairs)
     }
 }
 
@@ -117,17 +95,14 @@ fn success(found: &DeviceFound, time: Duration) -> Outcome {
     }
 }
 
-/// Returns an error if an answer about this number of boxes has not the form that a device promises.
-fn check(found: &DeviceFound, boxes: usize) -> Result<(), DeviceFailure> {
-    let are_pairs = are_pairs(&found.pairs, boxes) && are_pairs(&found.ended, boxes);
-    let are_ids = found.restarted.is_sorted_by(|one, next| one < next)
-        && found.restarted.iter().all(|id| (*id as usize) < boxes);
-    if are_pairs && are_ids && found.valid as usize <= boxes {
-        return Ok(());
+/// Returns an error if an answer has too many pairs, or not the form that a device promises.
+fn check(found: &DeviceFound, request: &SearchRequest<'_>) -> Result<(), DeviceFailure> {
+    let boxes = request.boxes.len();
+    if !are_pairs(&found.pairs, boxes) || found.valid as usize > boxes {
+        let form = format!("pairs a < b < {boxes}, and at most {boxes} valid boxes");
+        return Err(DeviceFailure::Failed(format!("the device's answer is malformed: {form} were expected")));
     }
-    let form =
-        format!("pairs a < b < {boxes}, ascending ids of restarted boxes, and at most {boxes} valid boxes");
-    Err(DeviceFailure::Failed(format!("the device's answer is malformed: {form} were expected")))
+    if found.pairs.len() as u64 > request.max_pairs { Err(DeviceFailure::TooManyPairs) } else { Ok(()) }
 }
 
 /// Returns true if pairs are in order, each once. Threads share the work: one alone takes as long as the device for all the rest.

@@ -164,19 +164,13 @@ impl Finder {
         let (Boxes { boxes, filters, .. }, Request { config, grouping, .. }) = (*all, *request);
         let (is_sorted, max_pairs) = (grouping.is_some(), config.limits.pairs());
         let request = SearchRequest { boxes, filters, is_sorted, max_pairs };
-        let pairs = std::mem::take(&mut self.pairs);
-        let call = |device: &mut dyn PairDevice, found: &mut _| device.find_all(&request, found);
-        let (outcome, found) = self.device.call(boxes.len(), pairs, call);
+        let (outcome, found) = self.device.find_all(&request, std::mem::take(&mut self.pairs));
         if !self.add(outcome)? {
             return Ok(false);
         }
-        if found.pairs.len() as u64 > max_pairs {
-            return Err(Error::TooManyPairs { limit: max_pairs });
-        }
-        if grouping.is_none() || are_in_order(&found.pairs) {
-            self.pairs = found.pairs;
-        } else {
-            self.all_pairs.take(found.pairs, grouping);
+        self.pairs = found;
+        if grouping.is_some() && !are_in_order(&self.pairs) {
+            self.all_pairs.take(&mut self.pairs, grouping);
             self.emit(grouping);
         }
         Ok(true)

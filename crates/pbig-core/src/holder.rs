@@ -9,6 +9,4 @@ pub(crate) enum Holder {
     Lanes,
     Grid,
     Tree,
-    /// The memory of a device.
-    Device,
 }

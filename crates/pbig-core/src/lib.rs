@@ -93,7 +93,7 @@ pub use finder::{Finder, find_pairs};
 pub use grid::{NeighbourScan, OccupiedCell, simd};
 pub use index::BoxIndex;
 pub use pair::{CrossPair, Pair};
-pub use pair_device::{ChangeRequest, ChangedBox, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
+pub use pair_device::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 pub use policy::NoDevice;
 pub use report::{Checks, DeviceReport, Report, StageTimes, WORK_LIMIT};
 

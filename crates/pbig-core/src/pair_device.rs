@@ -18,10 +18,10 @@ use std::fmt;
 /// # What the core promises
 ///
 /// * Ids are indices into [`SearchRequest::boxes`], and each filter belongs to the box of the same index.
-/// * Between two calls of [`PairDevice::find_changed`] without [`PairDevice::forget`], nothing has changed but the boxes in
-///   [`ChangeRequest::changed`] and new ids. So a device may keep the boxes of the last update and be sent the changes alone.
-/// * The core checks the form of an answer: ids out of range make it a failure, only a new pair can begin, and only a kept
-///   one can end. It does not check that pairs overlap or that none is missing.
+/// * Calls do not depend on each other: each has all boxes. A [`crate::BroadPhase`] compares the pairs of an update with those of
+///   the last one itself.
+/// * The core checks the form of an answer: ids out of range make it a failure. It does not check that pairs overlap or that
+///   none is missing.
 pub trait PairDevice: fmt::Debug + Send + Sync {
     /// Finds all pairs. `found` is empty, and has the memory of earlier calls.
     ///
@@ -30,27 +30,13 @@ pub trait PairDevice: fmt::Debug + Send + Sync {
     fn find_all(&mut self, request: &SearchRequest<'_>, found: &mut DeviceFound)
     -> Result<(), DeviceFailure>;
 
-    /// Finds the pairs that an update has changed: those that have begun since the last update ([`DeviceFound::pairs`]), and
-    /// those that have ended ([`DeviceFound::ended`]). Without an earlier update there were no boxes.
-    ///
-    /// # Errors
-    /// As [`PairDevice::find_all`].
-    fn find_changed(
-        &mut self,
-        request: &ChangeRequest<'_>,
-        found: &mut DeviceFound,
-    ) -> Result<(), DeviceFailure>;
-
-    /// Forgets the boxes of the last update: the CPU has done an update, or an update has failed and will be repeated.
-    fn forget(&mut self);
-
     /// Returns a name for reports. None while the device is not open or does not work.
     fn name(&self) -> Option<&str>;
 
     /// Returns true if the device is known to be a program on the CPU. [`crate::Backend::Auto`] does not use it then.
     fn is_software(&self) -> bool;
 
-    /// Returns a device for a clone of its owner. It may share the processor, but not the boxes of the last update.
+    /// Returns a device for a clone of its owner. It may share the processor.
     fn clone_box(&self) -> Box<dyn PairDevice>;
 }
 
@@ -63,54 +49,23 @@ impl Clone for Box<dyn PairDevice> {
 /// A search for all pairs.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchRequest<'a> {
-    /// The boxes, by id.
+    /// The boxes, by id. Some may be [`Aabb::NOWHERE`]: ids without a box.
     pub boxes: &'a [Aabb],
     /// Filters by id; none if all boxes may pair.
     pub filters: Option<&'a [ProxyFilter]>,
-    /// The caller wants the pairs by `(a, b)`. The core sorts them if the device does not.
+    /// The caller wants the pairs by `(a, b)`. The core sorts them if the device does not. An update takes them in any order.
     pub is_sorted: bool,
     /// Maximum number of pairs.
     pub max_pairs: u64,
-}
-
-/// An update.
-#[derive(Clone, Copy, Debug)]
-pub struct ChangeRequest<'a> {
-    /// The boxes now, by id; [`Aabb::NOWHERE`] where there is none.
-    pub boxes: &'a [Aabb],
-    /// The filters now, by id.
-    pub filters: &'a [ProxyFilter],
-    /// The changed boxes, each once. All others are as at the last update; new ids were absent.
-    pub changed: &'a [ChangedBox],
-    /// Number of pairs at the last update.
-    pub kept: u64,
-    /// Maximum number of added and ended pairs beyond `kept`.
-    pub max_pairs: u64,
-}
-
-/// A changed box as it was at the last update.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChangedBox {
-    /// Id of the box.
-    pub id: u32,
-    /// The box at the last update. [`Aabb::NOWHERE`] if it was absent, or if its pairs have ended already.
-    pub aabb: Aabb,
-    /// The filter at the last update.
-    pub filter: ProxyFilter,
 }
 
 /// The answer of a device.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct DeviceFound {
-    /// The pairs; of an update, the added ones.
+    /// The pairs.
     pub pairs: Vec<Pair>,
-    /// Pairs that an update has ended.
-    pub ended: Vec<Pair>,
-    /// Ids of changed boxes that the device treats as absent at the last update, ascending. All their pairs
-    /// are in `pairs`, and none is in `ended`: the core finds those that have ended.
-    pub restarted: Vec<u32>,
-    /// Number of valid boxes; of an update, of boxes that are valid now or were at the last update.
+    /// Number of valid boxes.
     pub valid: u32,
     /// The device's plan in words, for [`crate::Plan`]; none if it tested every pair.
     pub plan: Option<String>,
@@ -124,8 +79,7 @@ pub struct DeviceFound {
 /// Reason why a device has no answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceFailure {
-    /// There are more pairs than [`SearchRequest::max_pairs`], or more changes than [`ChangeRequest::max_pairs`] allows. The call
-    /// ends in [`crate::Error::TooManyPairs`].
+    /// There are more pairs than [`SearchRequest::max_pairs`]. The call ends in [`crate::Error::TooManyPairs`].
     TooManyPairs,
     /// The device could not do the work, for this reason. The CPU does it.
     Failed(String),

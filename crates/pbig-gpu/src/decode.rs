@@ -2,7 +2,7 @@
 //!
 //! Words that break the format give an error, never a panic: the output of a device is untrusted input.
 
-use crate::layout::{BOX_BITS, ENDED, LANES};
+use crate::layout::{BOX_BITS, LANES};
 use pbig_core::Pair;
 use pbig_core::internal::{self as parallel, SharedSlice};
 use std::mem::MaybeUninit;
@@ -74,30 +74,6 @@ fn checked(pair: Pair, boxes: u32, at: usize) -> Result<Pair, DecodeError> {
 fn whole_pairs(words: &[u32]) -> Result<&[Pair], DecodeError> {
     let half = DecodeError { what: "half a pair", at: words.len() };
     bytemuck::try_cast_slice(words).map_err(|_| half)
-}
-
-/// Appends the pairs of an update to the added or the ended pairs, by their marks ([`ENDED`]).
-///
-/// # Errors
-/// As [`plain`].
-pub fn events(
-    words: &[u32],
-    boxes: u32,
-    is_sorted: bool,
-    added: &mut Vec<Pair>,
-    ended: &mut Vec<Pair>,
-) -> Result<(), DecodeError> {
-    let mut last = None;
-    // One copy at once, see `copy_into`.
-    let given = whole_pairs(words)?.to_vec();
-    for (i, Pair { a, b: marked }) in given.into_iter().enumerate() {
-        let pair = checked(Pair { a, b: marked & !ENDED }, boxes, 2 * i)?;
-        if is_sorted && last.replace(pair) >= Some(pair) {
-            return Err(DecodeError { what: "pairs out of order", at: 2 * i });
-        }
-        if pair.b == marked { added.push(pair) } else { ended.push(pair) }
-    }
-    Ok(())
 }
 
 /// Appends the pairs of records. They name boxes by their index in `entries`, the boxes of all cells.

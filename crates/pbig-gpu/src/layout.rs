@@ -33,16 +33,10 @@ pub const PIECES: u32 = 3;
 pub const FIRST_PIECE: u32 = 4;
 /// Bits of [`Located::shape`] for the level. Above them are the numbers of cells less one, two bits an axis.
 pub const SPAN_BITS: u32 = 4;
-/// Number of bits of an entry for the box. Above them are [`MOVED`] and the axes.
+/// Number of bits of an entry for the box. Above them are an unused bit and the axes.
 pub const BOX_BITS: u32 = 28;
 /// The first of three bits of an entry, one for each axis. A bit is set if this is the box's lowest cell on the axis.
 pub const AXIS_BITS: u32 = 29;
-/// Bit of an entry and of [`Located::shape`] in a search for changes: the box has changed.
-pub const MOVED: u32 = 1 << BOX_BITS;
-/// Bit of the second id of a pair of output: the boxes overlapped at the last update, and no longer do.
-pub const ENDED: u32 = 1 << 31;
-/// Bit of [`BoxChange::marked_id`]: at the last update the box overlapped nothing.
-pub const WAS_ABSENT: u32 = 1 << 31;
 /// Bit of [`Params::flags`]: filters are tested.
 pub const FILTERED: u32 = 1;
 /// Bit of [`Params::flags`]: the output is records (docs/PAIR_FORMAT.md), not plain pairs.
@@ -68,13 +62,7 @@ macro_rules! shared_structs {
 shared_structs! {
     /// An [`Aabb`] in ordered integers, see [`ordered`].
     DeviceBox { low: [i32; 3], high: [i32; 3] }
-    /// A box now and at the last update.
-    Motion { now: DeviceBox, before: DeviceBox }
-    /// A changed box. Its id has the bit [`WAS_ABSENT`].
-    BoxChange { marked_id: u32, now: DeviceBox }
-    /// A changed filter.
-    FilterChange { id: u32, filter: ProxyFilter }
-    /// Cells that a box touches at its level: the lowest ones; the level, the numbers of cells and [`MOVED`], or [`NO_LEVEL`].
+    /// Cells that a box touches at its level: the lowest ones; the level and the numbers of cells, or [`NO_LEVEL`].
     Located { low: [i32; 3], shape: u32 }
     /// Cells of one size.
     Level { dims: [u32; 3], shift: u32, first_cell: u32, unused: [u32; 3] }
@@ -83,8 +71,7 @@ shared_structs! {
         boxes: u32, levels: u32, tick_exponent: i32, cells_per_tick: u32,
         cells: u32, small_cell: u32, columns: u32, flags: u32, split: u32,
         entry_capacity: u32, slot_capacity: u32, small_capacity: u32, large_capacity: u32,
-        known: u32, box_changes: u32, filter_changes: u32, pair_capacity: u32,
-        most_tests: u32, unused: [u32; 2], level: [Level; MAX_LEVELS]
+        pair_capacity: u32, most_tests: u32, unused: u32, level: [Level; MAX_LEVELS]
     }
     /// Range of the work items of one dispatch of the check kernels.
     Chunk {
@@ -108,10 +95,9 @@ shared_structs! {
         entries: u32, slots: u32, small_items: u32, large_items: u32,
         valid: u32, tests: u32, unused: u32, too_many_tests: u32
     }
-    /// Counts of a check, even if its output does not fit. Each has a low and a high half. A test is redundant if the
-    /// entries alone decide it: another cell owns the pair, or, in a search for changes, neither box has changed. Overlaps
-    /// include pairs that filters forbid. Without [`COUNTED`] there are only the words, and without [`PACKED`] no pairs.
-    /// `sorted` is 1 if plain pairs are in order.
+    /// Counts of a check, even if its output does not fit. Each has a low and a high half. A test is redundant if another cell
+    /// owns the pair. Overlaps include pairs that filters forbid. Without [`COUNTED`] there are only the words, and without
+    /// [`PACKED`] no pairs. `sorted` is 1 if plain pairs are in order.
     Totals { words: [u32; 2], pairs: [u32; 2], made: [u32; 2], redundant: [u32; 2], overlaps: [u32; 2],
         sorted: u32, unused: u32 }
 }

@@ -1,7 +1,7 @@
 //! Contract: kernels decide by integers. Compilers may contract, reorder and flush floats, and assume that there is no NaN: Metal's
 //! does unless it is told not to. So one coordinate could get two cells.
 
-use super::{texts, validate};
+use super::{kernels, validate};
 use naga::valid::FunctionInfo;
 use naga::{Function, Module, ScalarKind};
 
@@ -26,8 +26,8 @@ fn float_functions(module: &Module, info: &naga::valid::ModuleInfo) -> Vec<Strin
 #[test]
 fn no_kernel_computes_with_floats_but_for_the_estimate_of_a_row() {
     let mut estimates = 0;
-    for (kernel, changes) in texts() {
-        let (module, info) = validate(kernel, changes);
+    for kernel in kernels() {
+        let (module, info) = validate(kernel);
         let mut floats = float_functions(&module, &info);
         estimates += floats.len();
         floats.retain(|name| name != "estimated_row");

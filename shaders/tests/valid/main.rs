@@ -7,39 +7,34 @@ mod translate;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use pbig_shaders::{Buffer, INDEX_PAIRS, KERNELS, Kernel};
 
-fn parse(kernel: &Kernel, changes: bool) -> naga::Module {
-    let source = kernel.source(changes);
+fn parse(kernel: &Kernel) -> naga::Module {
+    let source = kernel.source();
     naga::front::wgsl::parse_str(&source)
         .unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&source)))
 }
 
-fn validate(kernel: &Kernel, changes: bool) -> (naga::Module, ModuleInfo) {
-    let module = parse(kernel, changes);
+fn validate(kernel: &Kernel) -> (naga::Module, ModuleInfo) {
+    let module = parse(kernel);
     let result = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
-    let info = result
-        .unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&kernel.source(changes))));
+    let info =
+        result.unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&kernel.source())));
     (module, info)
 }
 
-/// Returns every kernel, that of tests too, for a search for overlaps and for one for changes.
-fn texts() -> impl Iterator<Item = (&'static &'static Kernel, bool)> {
-    KERNELS.iter().chain([&&INDEX_PAIRS]).flat_map(|kernel| [(kernel, false), (kernel, true)])
+/// Returns every kernel, that of tests too.
+fn kernels() -> impl Iterator<Item = &'static Kernel> {
+    KERNELS.iter().copied().chain([&INDEX_PAIRS])
 }
 
 #[test]
-fn every_text_of_every_kernel_is_valid() {
-    for (kernel, changes) in texts() {
-        validate(kernel, changes);
-        let texts = [kernel.source(false), kernel.source(true)];
-        assert_eq!(texts[0] != texts[1], kernel.depends_on_search(), "{}", kernel.name);
-    }
-    assert!(KERNELS.iter().any(|kernel| kernel.depends_on_search()));
+fn every_kernel_is_valid() {
+    kernels().for_each(|kernel| _ = validate(kernel));
 }
 
 #[test]
 fn bindings_are_numbered_as_listed_and_there_are_no_others() {
-    for (kernel, changes) in texts() {
-        let (module, _) = validate(kernel, changes);
+    for kernel in kernels() {
+        let (module, _) = validate(kernel);
         let mut bound: Vec<(u32, String)> = module
             .global_variables
             .iter()
@@ -55,8 +50,8 @@ fn bindings_are_numbered_as_listed_and_there_are_no_others() {
 /// Without validation of indirect dispatches the number of workgroups is 0 on DirectX 12.
 #[test]
 fn no_text_asks_for_the_number_of_workgroups() {
-    for (kernel, changes) in texts() {
-        assert!(!kernel.source(changes).contains("num_workgroups"), "{}", kernel.name);
+    for kernel in kernels() {
+        assert!(!kernel.source().contains("num_workgroups"), "{}", kernel.name);
     }
 }
 
@@ -80,8 +75,8 @@ fn the_list_of_kernels_is_the_list_of_files() {
 
 #[test]
 fn uniform_buffers_are_the_ones_that_say_so() {
-    for (kernel, changes) in texts() {
-        let (module, _) = validate(kernel, changes);
+    for kernel in kernels() {
+        let (module, _) = validate(kernel);
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let is_uniform = variable.space == naga::AddressSpace::Uniform;
             let name = variable.name.as_deref();
@@ -93,8 +88,8 @@ fn uniform_buffers_are_the_ones_that_say_so() {
 
 #[test]
 fn kernels_stay_within_the_limits_that_every_device_has() {
-    for (kernel, changes) in texts() {
-        let (module, _) = validate(kernel, changes);
+    for kernel in kernels() {
+        let (module, _) = validate(kernel);
         let entry = &module.entry_points[0];
         assert_eq!((module.entry_points.len(), entry.name.as_str()), (1, kernel.name));
         assert!(entry.workgroup_size.iter().product::<u32>() <= 256, "{}: invocations", kernel.name);
@@ -110,6 +105,6 @@ fn kernels_stay_within_the_limits_that_every_device_has() {
 
 #[test]
 fn a_broken_kernel_does_not_pass() {
-    let broken = pbig_shaders::LOCATE.source(false).replace("params.boxes", "params.bodies");
+    let broken = pbig_shaders::LOCATE.source().replace("params.boxes", "params.bodies");
     assert!(naga::front::wgsl::parse_str(&broken).is_err());
 }

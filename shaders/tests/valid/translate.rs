@@ -1,11 +1,11 @@
-//! Contract: every text of every kernel translates to SPIR-V, MSL and HLSL. These are the languages of Vulkan, Metal and
+//! Contract: every kernel translates to SPIR-V, MSL and HLSL. These are the languages of Vulkan, Metal and
 //! DirectX 12. As on a device, kernels clear their workgroup memory themselves. The SPIR-V passes `spirv-val`, if the machine has that program.
 
-use super::{texts, validate};
+use super::{kernels, validate};
 use naga::back::pipeline_constants::process_overrides;
 use naga::back::{hlsl, msl, spv};
 use naga::valid::ModuleInfo;
-use pbig_shaders::{Buffer, KERNELS, Kernel};
+use pbig_shaders::{Buffer, Kernel};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -16,20 +16,9 @@ fn with_constants((module, info): &(naga::Module, ModuleInfo)) -> (naga::Module,
     (module.into_owned(), info.into_owned())
 }
 
-/// Returns every kernel with the module of each of its texts.
+/// Returns every kernel with its module.
 fn modules() -> impl Iterator<Item = (&'static Kernel, (naga::Module, ModuleInfo))> {
-    distinct().map(|(kernel, changes)| (kernel, module(kernel, changes)))
-}
-
-/// Returns every kernel, twice if it has two texts.
-fn distinct() -> impl Iterator<Item = (&'static Kernel, bool)> {
-    texts()
-        .filter(|(kernel, changes)| !changes || kernel.depends_on_search())
-        .map(|(kernel, changes)| (*kernel, changes))
-}
-
-fn module(kernel: &Kernel, changes: bool) -> (naga::Module, ModuleInfo) {
-    with_constants(&validate(kernel, changes))
+    kernels().map(|kernel| (kernel, with_constants(&validate(kernel))))
 }
 
 fn spirv(module: &naga::Module, info: &ModuleInfo) -> Vec<u32> {
@@ -41,14 +30,13 @@ fn spirv(module: &naga::Module, info: &ModuleInfo) -> Vec<u32> {
     spv::write_vec(module, info, &options, None).expect("SPIR-V")
 }
 
-/// Writes a translation into the folder that `PBIG_TEXTS` names, for `scripts/gpu.sh`. The file is named by the kernel, its
-/// search and its bindings: `u` for a uniform buffer, `s` for a storage buffer.
-fn keep(kernel: &Kernel, changes: bool, ending: &str, text: &[u8]) {
+/// Writes a translation into the folder that `PBIG_TEXTS` names, for `scripts/gpu.sh`. The file is named by the kernel and its
+/// bindings: `u` for a uniform buffer, `s` for a storage buffer.
+fn keep(kernel: &Kernel, ending: &str, text: &[u8]) {
     let Some(folder) = std::env::var_os("PBIG_TEXTS") else { return };
-    let search = if changes { "changes" } else { "overlaps" };
     let letter = |buffer: &Buffer| if buffer.is_uniform() { 'u' } else { 's' };
     let bindings: String = kernel.bindings.iter().map(letter).collect();
-    let name = format!("{}.{search}.{bindings}.{ending}", kernel.name);
+    let name = format!("{}.{bindings}.{ending}", kernel.name);
     std::fs::write(Path::new(&folder).join(name), text).expect("the folder exists");
 }
 
@@ -78,13 +66,12 @@ fn has_spirv_val() -> bool {
 }
 
 #[test]
-fn every_text_is_valid_spirv() {
+fn every_kernel_is_valid_spirv() {
     let folder = tempfile::tempdir().expect("a folder");
     let judged = has_spirv_val();
-    for (kernel, changes) in distinct() {
-        let (module, info) = module(kernel, changes);
+    for (kernel, (module, info)) in modules() {
         let words = spirv(&module, &info);
-        keep(kernel, changes, "spv", &bytes(&words));
+        keep(kernel, "spv", &bytes(&words));
         let verdict = judge(folder.path(), &words).filter(|_| judged);
         let is_valid = verdict.as_ref().is_none_or(|output| output.status.success());
         assert!(is_valid, "{}: {verdict:?}", kernel.name);
@@ -104,7 +91,7 @@ fn broken_spirv_is_not_valid() {
 }
 
 #[test]
-fn every_text_translates_to_metal() {
+fn every_kernel_translates_to_metal() {
     for (kernel, (module, info)) in modules() {
         let options = msl::Options { lang_version: (2, 0), ..msl::Options::default() };
         let written = msl::write_string(&module, &info, &options, &msl::PipelineOptions::default());
@@ -114,9 +101,8 @@ fn every_text_translates_to_metal() {
 }
 
 #[test]
-fn every_text_translates_to_directx() {
-    for (kernel, changes) in distinct() {
-        let (module, info) = module(kernel, changes);
+fn every_kernel_translates_to_directx() {
+    for (kernel, (module, info)) in modules() {
         let options = hlsl::Options {
             shader_model: hlsl::ShaderModel::V5_1,
             zero_initialize_workgroup_memory: false,
@@ -126,11 +112,6 @@ fn every_text_translates_to_directx() {
         let written = hlsl::Writer::new(&mut text, &options, &pipeline).write(&module, &info, None);
         written.unwrap_or_else(|error| panic!("{}: {error}", kernel.name));
         assert!(text.contains(&format!("void {}(", kernel.name)), "{text}");
-        keep(kernel, changes, "hlsl", text.as_bytes());
+        keep(kernel, "hlsl", text.as_bytes());
     }
-}
-
-#[test]
-fn both_texts_of_a_kernel_are_translated() {
-    assert!(modules().count() > KERNELS.len() + 4);
 }

@@ -104,20 +104,15 @@ impl BroadPhase {
         Ok(broad_phase)
     }
 
-    /// Uses this device, beginning with the first update whose changes are all set after this call. Earlier updates use the CPU.
+    /// Uses this device from the next update on.
     pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
         self.device = DeviceSlot::new(device);
-        self.world.keep_old = self.old_to_keep();
-        if self.holder == Holder::Device {
-            self.holder = Holder::Nothing;
-        }
     }
 
     /// Sets where the next updates run, and their limits: for tests and measurements.
     #[doc(hidden)]
     pub fn set_backend(&mut self, backend: Backend, limits: Limits) {
         (self.config.backend, self.config.limits) = (backend, limits);
-        self.world.keep_old = self.old_to_keep();
     }
 
     /// Returns the name of the device in use. None while there is no device or it has failed.
@@ -239,8 +234,7 @@ impl BroadPhase {
 
     /// Removes all boxes; their pairs end without an event.
     pub fn clear(&mut self) {
-        let mut device = std::mem::take(&mut self.device);
-        device.changed = Vec::new();
+        let device = std::mem::take(&mut self.device);
         *self = Self { config: self.config, device, ..Self::default() };
         self.world.keep_old = self.old_to_keep();
     }
@@ -250,11 +244,8 @@ impl BroadPhase {
         self.world.shrink();
         self.kept.shrink(self.world.ids());
         (self.store, self.engines) = (Store::default(), Engines::default());
-        self.device.changed = Vec::new();
         self.comparison = Scratch::default();
-        if self.holder != Holder::Device {
-            self.holder = Holder::Nothing;
-        }
+        self.holder = Holder::Nothing;
         self.events.added.shrink_to_fit();
         self.events.removed.shrink_to_fit();
     }

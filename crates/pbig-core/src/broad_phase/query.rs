@@ -105,7 +105,7 @@ impl BroadPhase {
         match self.holder {
             Holder::Grid => self.store.grid.occupied_cells(),
             Holder::Tree => self.store.tree.occupied_leaves(),
-            Holder::Nothing | Holder::Lanes | Holder::Device => Vec::new(),
+            Holder::Nothing | Holder::Lanes => Vec::new(),
         }
     }
 

@@ -1,13 +1,13 @@
 //! An update: choose an engine, run it, keep the pairs, report.
 
-use super::engines::{self, Task};
+use super::engines::Task;
 use super::{BroadPhase, Events};
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
 use crate::pairs::Comparison;
 use crate::policy::{self, Counts, Work};
 use crate::report::Clock;
-use crate::{Backend, Engine, Error, NoDevice, Plan};
+use crate::{Backend, Engine, Error, Plan};
 
 impl BroadPhase {
     /// Finds what has changed since the last update. Takes next to no time when nothing has.
@@ -50,17 +50,16 @@ impl BroadPhase {
     }
 
     fn find_events(&mut self) -> Result<(), Error> {
-        if self.is_for_device() {
+        if self.device.is_wanted(&self.config, Work::Update, &mut self.report) {
             let outcome = self.run(None);
             if self.take(outcome)? {
                 return Ok(());
             }
         }
-        let changed = self.world.changed.len();
         let engine = self.choose_engine();
         let outcome = self.run(Some(engine));
         if engine != Engine::Rebuild {
-            self.given_up.note(outcome.end == End::GivenUp, changed);
+            self.given_up.note(outcome.end == End::GivenUp, self.world.changed.len());
         }
         if !self.take(outcome)? {
             let outcome = self.run(Some(Engine::Rebuild));
@@ -68,15 +67,6 @@ impl BroadPhase {
             debug_assert!(is_done, "a rebuild never gives up");
         }
         Ok(())
-    }
-
-    /// Returns true if a device should do the update. Otherwise the report gets the reason.
-    fn is_for_device(&mut self) -> bool {
-        let is_wanted = self.device.is_wanted(&self.config, Work::Update, &mut self.report);
-        if is_wanted && !self.world.knows_old() {
-            self.report.plan.no_device = Some(NoDevice::OldBoxesUnknown);
-        }
-        is_wanted && self.world.knows_old()
     }
 
     fn choose_engine(&mut self) -> Engine {
@@ -104,7 +94,7 @@ impl BroadPhase {
         let mut task = Task { world, config, holder: *holder, store, kept, events };
         match engine {
             Some(engine) => self.engines.run(engine, &mut task),
-            None => engines::on_device::run(&mut self.device, &mut task),
+            None => self.engines.run_on(&mut self.device, &mut task),
         }
     }
 
@@ -152,10 +142,6 @@ impl BroadPhase {
 
     /// Returns the number of old states to keep until the next update.
     pub(super) fn old_to_keep(&self) -> usize {
-        // Auto has no use for them. Who switches to the CPU may switch back.
-        if self.device.has_device() && self.config.backend != Backend::Auto {
-            return usize::MAX;
-        }
         policy::old_states_to_keep(self.len(), self.config.engine)
     }
 

@@ -312,10 +312,17 @@ impl Hits {
         }
     }
 
-    /// Takes pairs that were found elsewhere.
-    pub(crate) fn take(&mut self, pairs: Vec<Pair>) {
-        *self.pairs = pairs;
+    /// Takes pairs that were found elsewhere, and leaves other memory for them.
+    pub(crate) fn take(&mut self, pairs: &mut Vec<Pair>) {
+        self.pairs.swap_list(pairs);
         self.count_groups(0);
+    }
+
+    /// Adds pairs that were found elsewhere.
+    pub(crate) fn add(&mut self, pairs: &[Pair]) {
+        let from = self.pairs.len();
+        self.pairs.extend_from_slice(pairs);
+        self.count_groups(from);
     }
 
     /// Drops the pairs from `from` on whose filters, or keys, do not allow them.

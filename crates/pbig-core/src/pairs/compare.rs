@@ -56,6 +56,9 @@ impl Comparison {
             part.added.clear();
             part.removed.clear();
             found.sort::<false>(group, sorter, spans, pool, first_place);
+            if found.may_repeat {
+                groups::drop_repeated(spans, pool, first_place);
+            }
             let new = NewRows { names, first_id, first_place, spans, pool };
             dispatch!(Part::compare, part, old, &new);
         });
@@ -85,14 +88,6 @@ impl Comparison {
         for events in [added, removed, dropped] {
             groups::sort(events, sorted, counts, ids);
         }
-    }
-
-    /// Sorts events of which some may have been found twice. These are left once.
-    pub(crate) fn sort_and_dedup(&mut self, ids: usize) {
-        self.sort(ids);
-        self.added.dedup();
-        self.removed.dedup();
-        self.dropped.dedup();
     }
 
     fn gather(&mut self) {

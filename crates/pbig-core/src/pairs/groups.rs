@@ -56,6 +56,8 @@ impl Span {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Groups {
     pub(super) grouping: Grouping,
+    /// True if pairs may be there twice: those of a device that breaks its promise.
+    pub(crate) may_repeat: bool,
     /// Pairs, group by group.
     pairs: ShrinkingVec<Pair>,
     /// By group: its first pair; then the number of pairs.
@@ -243,6 +245,31 @@ pub(super) fn sort(
     }
 }
 
+/// Shortens the rows of a group that have an id twice. The group's first row begins at `base`. A sorted row that repeats an id has every
+/// id of the row and no other, but perhaps not in order.
+pub(super) fn drop_repeated(spans: &mut [Span], others: &mut [u32], base: u32) {
+    for span in spans {
+        let start = (span.start - base) as usize;
+        let row = &mut others[start..start + span.len as usize];
+        if !row.is_sorted_by(|one, next| one < next) {
+            row.sort_unstable();
+            span.len = dedup(row) as u32;
+        }
+    }
+}
+
+/// Moves each id of a sorted row to its start, once. Returns the number of different ids.
+fn dedup(row: &mut [u32]) -> usize {
+    let mut len = 0;
+    for i in 0..row.len() {
+        if len == 0 || row[len - 1] < row[i] {
+            row[len] = row[i];
+            len += 1;
+        }
+    }
+    len
+}
+
 /// Scatters the `b` of pairs into rows, and sorts the rows.
 #[inline(always)]
 fn sort_rows<const LIST: bool>(
@@ -282,6 +309,20 @@ fn sort_rows<const LIST: bool>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_that_repeat_an_id_are_shortened_and_others_stay() {
+        let mut others = [3, 5, 9, 5, 9, 7, 7, 1, 2];
+        let lens = [1, 4, 0, 2, 2];
+        let mut start = 100;
+        let mut spans = lens.map(|len| {
+            start += len;
+            Span { start: start - len, len }
+        });
+        drop_repeated(&mut spans, &mut others, 100);
+        let rows = spans.map(|span| others[span.start as usize - 100..][..span.len as usize].to_vec());
+        assert_eq!(rows, [vec![3], vec![5, 9], vec![], vec![7], vec![1, 2]]);
+    }
 
     #[test]
     fn many_events_are_sorted_whatever_the_number_of_ids() {

@@ -177,14 +177,6 @@ impl Kept {
         self.forward.row(pair.a).binary_search(&pair.b).is_ok()
     }
 
-    /// Yields `pairs`, each with whether it exists.
-    pub(crate) fn look_up(&self, pairs: &[Pair]) -> impl Iterator<Item = (Pair, bool)> {
-        pairs.iter().enumerate().map(|(i, pair)| {
-            self.forward.prefetch(&pairs[i..]);
-            (*pair, self.contains(*pair))
-        })
-    }
-
     fn reversed(&self) -> Rows {
         let mut spans = vec![Span::default(); self.lower.len()];
         let mut next = 0;
@@ -321,8 +313,7 @@ mod tests {
         kept.apply(&pairs, &[]);
         let unknown = [Pair { a: 1, b: 98 }, Pair { a: 70, b: 99 }, Pair { a: 5000, b: 5001 }];
         let asked = [&unknown[..], &pairs, &unknown].concat();
-        let existing = kept.look_up(&asked).filter_map(|(pair, exists)| exists.then_some(pair));
-        assert!(existing.eq(pairs));
+        assert!(asked.into_iter().filter(|pair| kept.contains(*pair)).eq(pairs));
     }
 
     /// Batches of every size, whose pairs share `a`, share `b` or neither, beside a set of pairs.

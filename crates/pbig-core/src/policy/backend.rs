@@ -33,11 +33,8 @@ pub enum NoDevice {
     Software,
     /// There are too few boxes for a search.
     FewBoxes,
-    /// An update. On an H100 it took 0.9 to 2 times as long as on 16 threads, and 0.4 to 2 times as long as on four.
+    /// An update: [`Backend::Auto`] leaves all of them to the CPU.
     Update,
-    /// The boxes of the last update are not known, after a restore or if the device came amid changes: the CPU does one update,
-    /// also with [`Backend::Device`].
-    OldBoxesUnknown,
 }
 
 impl fmt::Display for NoDevice {
@@ -47,7 +44,6 @@ impl fmt::Display for NoDevice {
             Self::Software => "the given one is software",
             Self::FewBoxes => "there are too few boxes",
             Self::Update => "updates are made by the CPU",
-            Self::OldBoxesUnknown => "the boxes of the last update are not known",
         })
     }
 }
@@ -60,6 +56,9 @@ impl fmt::Display for NoDevice {
 /// | `Cpu`, `Brute` | any | any | CPU |
 /// | `Auto` | hardware | a search of at least [`AUTO_DEVICE_FROM_BOXES`] | device |
 /// | `Auto` | any | any | CPU |
+///
+/// In an update a device searches all boxes. The CPU looks at the changed ones alone if they are few, with a structure of the last
+/// update, which a device does not leave.
 pub(crate) fn choose_backend(backend: Backend, is_software: Option<bool>, work: Work) -> Choice {
     Choice::Cpu(match (backend, is_software) {
         (Backend::Device, _) => return Choice::Device,

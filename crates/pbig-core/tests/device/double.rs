@@ -1,8 +1,6 @@
 //! A device that tests every pair, and that fails or lies if it is told to.
 
-use pbig_core::{
-    Aabb, ChangeRequest, DeviceFailure, DeviceFound, Pair, PairDevice, ProxyFilter, SearchRequest, oracle,
-};
+use pbig_core::{DeviceFailure, DeviceFound, Pair, PairDevice, ProxyFilter, SearchRequest, oracle};
 use std::time::Duration;
 
 /// A fault of a device.
@@ -15,22 +13,14 @@ pub(super) enum Fault {
     IsSlow,
     /// From the third call on it fails after half of the answer.
     IsLost,
-    /// It treats every second changed box as new, which it may.
-    Restarts,
     /// Pairs are out of order, which they may be.
     Disorder,
     /// Each pair comes twice, out of order.
     Twice,
-    /// Pairs that are kept come as added ones.
-    OldNews,
-    /// Pairs that are not kept come as ended ones.
-    EndsOthers,
     /// A pair names a box beyond the last one.
     BeyondTheLast,
     /// A pair names the larger id first.
     Inverted,
-    /// It restarts a box beyond the last one.
-    RestartsOthers,
     /// It counts more valid boxes than there are boxes.
     MoreThanAll,
     /// It leaves out half of the pairs.
@@ -48,13 +38,11 @@ pub(super) struct Double {
     pub(super) fault: Fault,
     pub(super) is_software: bool,
     calls: u32,
-    /// The boxes of the last update, unless they were forgotten.
-    pub(super) known: Option<Vec<Aabb>>,
 }
 
 impl Double {
     pub(super) fn new(fault: Fault) -> Box<Self> {
-        Box::new(Self { fault, is_software: false, calls: 0, known: None })
+        Box::new(Self { fault, is_software: false, calls: 0 })
     }
 
     /// Spoils a right answer about so many boxes.
@@ -72,13 +60,9 @@ impl Double {
                 return Err(DeviceFailure::Failed("lost".into()));
             }
             Fault::Disorder => found.pairs.reverse(),
-            Fault::Twice => {
-                found.pairs.extend_from_within(..);
-                found.ended.extend_from_within(..);
-            }
+            Fault::Twice => found.pairs.extend_from_within(..),
             Fault::BeyondTheLast => found.pairs.push(Pair { a: 0, b: n }),
             Fault::Inverted => found.pairs.push(Pair { a: n - 1, b: 0 }),
-            Fault::RestartsOthers => found.restarted.push(n),
             Fault::MoreThanAll => found.valid = n + 1,
             Fault::TooFew => found.pairs.retain(|pair| (pair.a + pair.b).is_multiple_of(2)),
             Fault::TooMany => found.pairs.extend(some_pairs(boxes).step_by(4)),
@@ -86,28 +70,12 @@ impl Double {
         }
         Ok(())
     }
-
-    /// Holds the core to its promise: only the boxes that it lists have changed.
-    fn compare_with_known(&self, before: &[Aabb]) {
-        let Some(known) = &self.known else { return };
-        for (id, aabb) in before.iter().enumerate().filter(|(_, aabb)| aabb.is_valid()) {
-            assert_eq!(known.get(id), Some(aabb), "box {id} has changed unseen");
-        }
-    }
-}
-
-fn difference(pairs: &[Pair], others: &[Pair]) -> Vec<Pair> {
-    pairs.iter().filter(|pair| others.binary_search(pair).is_err()).copied().collect()
 }
 
 /// Returns pairs of which most do not overlap.
 fn some_pairs(boxes: usize) -> impl Iterator<Item = Pair> {
     let n = boxes as u32;
     (1..n).map(move |b| Pair { a: b * 7 % b.max(2) / 2, b })
-}
-
-fn count_valid(boxes: &[Aabb]) -> u32 {
-    boxes.iter().filter(|one| one.is_valid()).count() as u32
 }
 
 impl PairDevice for Double {
@@ -118,46 +86,11 @@ impl PairDevice for Double {
     ) -> Result<(), DeviceFailure> {
         let all = vec![ProxyFilter::ALL; request.boxes.len()];
         found.pairs = oracle::pairs_filtered(request.boxes, request.filters.unwrap_or(&all));
-        found.valid = count_valid(request.boxes);
+        found.valid = request.boxes.iter().filter(|one| one.is_valid()).count() as u32;
         if found.pairs.len() as u64 > request.max_pairs && self.fault != Fault::IgnoresLimits {
             return Err(DeviceFailure::TooManyPairs);
         }
         self.spoil(found, request.boxes.len())
-    }
-
-    fn find_changed(
-        &mut self,
-        request: &ChangeRequest<'_>,
-        found: &mut DeviceFound,
-    ) -> Result<(), DeviceFailure> {
-        let (mut boxes, mut filters) = (request.boxes.to_vec(), request.filters.to_vec());
-        for change in request.changed {
-            (boxes[change.id as usize], filters[change.id as usize]) = (change.aabb, change.filter);
-        }
-        self.compare_with_known(&boxes);
-        if self.fault == Fault::Restarts {
-            found.restarted =
-                request.changed.iter().map(|change| change.id).filter(|id| id % 2 == 0).collect();
-            found.restarted.sort_unstable();
-            found.restarted.iter().for_each(|id| boxes[*id as usize] = Aabb::NOWHERE);
-        }
-        let now = oracle::pairs_filtered(request.boxes, request.filters);
-        let before = oracle::pairs_filtered(&boxes, &filters);
-        (found.pairs, found.ended) = (difference(&now, &before), difference(&before, &now));
-        match self.fault {
-            Fault::OldNews => found.pairs = now,
-            Fault::EndsOthers => {
-                found.ended.extend(some_pairs(request.boxes.len()).filter(|pair| !before.contains(pair)))
-            }
-            _ => {}
-        }
-        found.valid = count_valid(request.boxes);
-        self.known = Some(request.boxes.to_vec());
-        self.spoil(found, request.boxes.len())
-    }
-
-    fn forget(&mut self) {
-        self.known = None;
     }
 
     fn name(&self) -> Option<&str> {
@@ -169,6 +102,6 @@ impl PairDevice for Double {
     }
 
     fn clone_box(&self) -> Box<dyn PairDevice> {
-        Box::new(Self { known: None, ..self.clone() })
+        Box::new(self.clone())
     }
 }

@@ -15,20 +15,16 @@ const IDS: u32 = 120;
 const ON_DEVICE: Config = Config { backend: Backend::Device, margin: 0.1, ..Config::DEFAULT };
 
 /// Faults that the core notices, or that are none.
-const HARMLESS: [Fault; 14] = [
+const HARMLESS: [Fault; 10] = [
     Fault::Nothing,
     Fault::Fails,
     Fault::Declines,
     Fault::IsSlow,
     Fault::IsLost,
-    Fault::Restarts,
     Fault::Disorder,
     Fault::Twice,
-    Fault::OldNews,
-    Fault::EndsOthers,
     Fault::BeyondTheLast,
     Fault::Inverted,
-    Fault::RestartsOthers,
     Fault::MoreThanAll,
 ];
 
@@ -95,7 +91,7 @@ fn updates_equal_those_of_the_cpu_whatever_fails() {
         let wanted = match fault {
             Fault::Fails | Fault::Declines => 15..=25,
             Fault::IsLost => 2..=2,
-            Fault::BeyondTheLast | Fault::Inverted | Fault::RestartsOthers | Fault::MoreThanAll => 0..=0,
+            Fault::BeyondTheLast | Fault::Inverted | Fault::MoreThanAll => 0..=0,
             _ => 35..=40,
         };
         assert!(wanted.contains(&done_by_device), "{fault:?}: {done_by_device} updates");
@@ -206,10 +202,10 @@ fn auto_searches_on_hardware_from_a_hundred_thousand_boxes_on() {
     }
 }
 
-/// More changes and events than a thread takes at a time: a row of boxes whose every second one moves.
+/// More pairs than a thread takes at a time, in an order that is not theirs: a row of boxes whose every second one moves.
 #[test]
 fn updates_of_many_boxes_equal_those_of_the_cpu() {
-    let (mut ours, mut cpu) = (on_device(Fault::Nothing), on_cpu());
+    let (mut ours, mut cpu) = (on_device(Fault::Twice), on_cpu());
     let ids: Vec<u32> = (0..40_000).collect();
     for (step, moved) in [(0.0, &ids[..]), (0.6, &ids[..]), (0.0, &ids[3..35_000])] {
         let x = |id: u32| id as f32 + if id.is_multiple_of(2) { 0.0 } else { step };
@@ -223,9 +219,8 @@ fn updates_of_many_boxes_equal_those_of_the_cpu() {
     assert!(cpu.events().removed.len() > 17_000, "{}", cpu.events().removed.len());
 }
 
-/// A device needs each changed box as it was. Without a device few of them are kept.
 #[test]
-fn a_device_that_comes_amid_changes_begins_with_the_next_update() {
+fn a_device_that_comes_amid_changes_does_the_next_update() {
     let (mut ours, mut cpu) = (BroadPhase::new(ON_DEVICE).expect("a margin"), on_cpu());
     let mut rng = StdRng::seed_from_u64(8);
     for update in 0..8 {
@@ -237,21 +232,24 @@ fn a_device_that_comes_amid_changes_begins_with_the_next_update() {
         disturb(&mut [&mut ours, &mut cpu], &mut rng);
         assert_eq!(ours.update(), cpu.update(), "update {update}");
         let report = ours.report();
-        let why = (update == 4).then_some(NoDevice::OldBoxesUnknown);
-        assert_eq!((report.device.is_some(), report.plan.no_device), (update > 4, why), "update {update}");
+        assert_eq!((report.device.is_some(), report.plan.no_device), (update >= 4, None), "update {update}");
     }
 }
 
-/// A device may have worked for another world.
+/// The device gets a list of the boxes that are left, and its pairs the ids of the world. Its order does not matter.
 #[test]
-fn another_device_forgets_the_boxes_that_it_knew() {
-    let (mut ours, mut cpu, mut rng) = (on_device(Fault::Nothing), on_cpu(), StdRng::seed_from_u64(9));
-    for seed in 0..3 {
-        disturb(&mut [&mut ours, &mut cpu], &mut rng);
-        assert_eq!(ours.update(), cpu.update());
-        let mut other = Double::new(Fault::Nothing);
-        other.known = Some(random_boxes(seed));
-        ours.set_device(other);
+fn updates_after_a_peak_equal_those_of_the_cpu() {
+    for fault in [Fault::Nothing, Fault::Disorder, Fault::Twice, Fault::Fails] {
+        let (mut ours, mut cpu, mut rng) = (on_device(fault), on_cpu(), StdRng::seed_from_u64(9));
+        for update in 0..30 {
+            for world in [&mut ours, &mut cpu] {
+                (0..IDS * update / 30).for_each(|id| _ = world.remove(id));
+            }
+            disturb(&mut [&mut ours, &mut cpu], &mut rng);
+            assert_eq!(ours.update(), cpu.update(), "{fault:?}, update {update}");
+            assert!(ours.pairs().eq(cpu.pairs()), "{fault:?}, update {update}");
+        }
+        assert!(ours.len() < IDS as usize / 2 && ours.pair_count() > 0, "{} boxes", ours.len());
     }
 }
 

@@ -92,9 +92,8 @@ impl Session {
         self.sizes.word_capacity = words;
         let Params { levels, flags, .. } = self.params;
         let fits = words <= self.storage.max_buffer_bytes / 4;
-        // Output that does not fit comes as bits the next time. They have no mark that tells ended pairs from new ones. Fewer boxes at
-        // a time have fewer of both.
-        if levels == 0 && !fits && (self.finds_changes || flags & BITS != 0) {
+        // Output that does not fit comes as bits the next time. Fewer boxes at a time have fewer of them.
+        if levels == 0 && !fits && flags & BITS != 0 {
             return Err(self.too_large().into());
         }
         // The map is there, so only the checks are repeated, unless the pairs can be sorted with it.

@@ -4,14 +4,14 @@ use super::coding::bit_words;
 use super::error::Failure;
 use super::gpu_device::Variant;
 use super::items::rest;
-use super::passes::{Recording, Step, apply_changes, check, lists_fit, sort};
+use super::passes::{Recording, Step, check, lists_fit, sort};
 use super::readback::{self, HEADER_BYTES, Header, Mapped};
 use super::session::Session;
 use super::storage::{BufferId, Side};
 use super::{GpuError, wait};
 use crate::decode::{self, DecodeError};
 use crate::layout::{BITS, Chunk, Counters, PACKED, Params, SORTED, Totals, halves, wide};
-use pbig_core::{DeviceFound, internal::Clock};
+use pbig_core::internal::Clock;
 use pbig_shaders::{Buffer, Kernel};
 use std::time::Duration;
 
@@ -42,7 +42,7 @@ pub(super) enum ChunkResult {
 }
 
 impl Session {
-    /// Submits a chunk: uploads and changes that wait, and `steps`.
+    /// Submits a chunk: uploads that wait, and `steps`.
     pub(super) fn submit(
         &mut self,
         items: Chunk,
@@ -86,7 +86,7 @@ impl Session {
         self.storage.write(BufferId::of(Buffer::Chunk, side), &[items])
     }
 
-    /// Records and submits uploads and changes that wait, `steps`, and a readback of some bytes of output, if they are told.
+    /// Records and submits uploads that wait, `steps`, and a readback of some bytes of output, if they are told.
     /// Returns the kernels.
     fn record(
         &mut self,
@@ -103,15 +103,11 @@ impl Session {
             encoder: copies.unwrap_or_else(|| self.device.encoder()),
             storage: &mut self.storage,
             side,
-            variant: Variant::new(&self.options, self.finds_changes),
+            variant: Variant::new(&self.options),
             queries: timestamps.map(|timestamps| &timestamps.queries),
             passes: Vec::new(),
         };
-        // Applied once, however often a map or a chunk is repeated.
-        let has_changes = std::mem::take(&mut self.has_pending_changes);
-        let changes = has_changes.then(|| apply_changes(&self.params));
-        let steps: Vec<Step> = changes.into_iter().flatten().chain(steps.iter().copied()).collect();
-        recording.record(&steps);
+        recording.record(steps);
         if let Some(prefetched) = prefetched {
             readback::record(&mut recording, timestamps, prefetched);
         }
@@ -210,7 +206,7 @@ impl Session {
         if needed <= have {
             return self.decode_words(&prefetched[..needed as usize], is_sorted).await;
         }
-        if self.has(PACKED) || self.has(BITS) || self.finds_changes {
+        if self.has(PACKED) || self.has(BITS) {
             // A record may begin in one part and end in the other. The second is given back, for the entries.
             let rest = self.fetch(out, have, needed).await?;
             let words = [prefetched, bytemuck::cast_slice(&rest)].concat();
@@ -240,13 +236,11 @@ impl Session {
     fn decode(&mut self, words: &[u32], is_sorted: bool) -> Result<(), DecodeError> {
         let boxes = self.params.boxes;
         let (is_packed, is_bits) = (self.has(PACKED), self.has(BITS));
-        let DeviceFound { pairs, ended, .. } = &mut self.sink.found;
+        let pairs = &mut self.sink.found.pairs;
         if is_bits {
             decode::bits(words, boxes, pairs)
         } else if is_packed {
             decode::records(words, self.table.as_deref().unwrap_or(&[]), boxes, pairs)
-        } else if self.finds_changes {
-            decode::events(words, boxes, is_sorted, pairs, ended)
         } else {
             decode::plain(words, boxes, is_sorted, pairs)
         }

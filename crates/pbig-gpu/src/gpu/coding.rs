@@ -17,8 +17,6 @@ impl Session {
     pub(super) fn coding_flag(&self, job: &Job<'_>) -> u32 {
         let (sizes, has_grid) = (&self.sizes, self.params.levels > 0);
         let is_packed = match self.options.coding {
-            // Changes are rarely so many that records or bits are smaller, and need a mark.
-            _ if self.finds_changes => false,
             // One bit a pair fits the smallest buffer.
             _ if !has_grid && sizes.word_capacity > self.storage.max_buffer_bytes / 4 => true,
             // Records save transfers, and cost the host more: on an H100 115 ms became 352 for 115 million pairs.

@@ -26,15 +26,13 @@ pub enum Fault {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Variant {
     is_balanced: bool,
-    /// The search is for changes instead of all pairs.
-    changes: bool,
     /// The scan is of rows of pairs instead of cells.
     rows: bool,
 }
 
 impl Variant {
-    pub(super) fn new(options: &GpuOptions, changes: bool) -> Self {
-        Self { is_balanced: options.load_balancing, changes, rows: false }
+    pub(super) fn new(options: &GpuOptions) -> Self {
+        Self { is_balanced: options.load_balancing, rows: false }
     }
 
     pub(super) fn of_rows(self) -> Self {
@@ -164,26 +162,24 @@ impl GpuDevice {
         }
     }
 
-    /// Compiles the kernels of all searches.
+    /// Compiles all kernels.
     pub(super) fn compile_all(&self, options: &GpuOptions) {
-        for (kernel, changes) in KERNELS.iter().flat_map(|kernel| [(kernel, false), (kernel, true)]) {
-            self.pipeline(kernel, Variant::new(options, changes));
+        let variant = Variant::new(options);
+        for kernel in KERNELS {
+            self.pipeline(kernel, variant);
         }
-        // The scan does not depend on what is searched for.
         for kernel in [&SCAN_BLOCKS, &SCAN_SUMS] {
-            self.pipeline(kernel, Variant::new(options, false).of_rows());
+            self.pipeline(kernel, variant.of_rows());
         }
     }
 
     /// Returns the pipeline of a kernel, which is compiled at first use.
     pub(super) fn pipeline(&self, kernel: &'static Kernel, variant: Variant) -> wgpu::ComputePipeline {
-        // Most kernels do not depend on what is searched for.
-        let variant = Variant { changes: variant.changes && kernel.depends_on_search(), ..variant };
         let mut pipelines = lock(&self.pipelines);
         if let Some(pipeline) = pipelines.get(&(kernel.name, variant)) {
             return pipeline.clone();
         }
-        let mut source = kernel.source(variant.changes);
+        let mut source = kernel.source();
         if self.is_due(Fault::RefuseShader) {
             source.push_str("this is no WGSL");
         }

@@ -4,7 +4,6 @@
 
 mod adapter;
 mod attempts;
-mod changes;
 mod chunk;
 mod coding;
 mod declined;
@@ -25,7 +24,6 @@ mod sink;
 mod storage;
 pub mod testing;
 mod ticks;
-mod upload;
 #[cfg_attr(target_arch = "wasm32", path = "wait_web.rs")]
 mod wait;
 
@@ -41,7 +39,7 @@ use declined::Declined;
 use gpu_device::GpuDevice;
 use job::Job;
 use pbig_core::internal::Clock;
-use pbig_core::{ChangeRequest, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
+use pbig_core::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 use search::search;
 use session::Session;
 use std::sync::Arc;
@@ -129,8 +127,7 @@ impl GpuFinder {
         Self { options, ..self }
     }
 
-    /// Compiles all kernels for the present options. Otherwise the first search and the first update do, which takes a driver up to a
-    /// second: call it while the app loads, perhaps on a clone in another thread.
+    /// Compiles all kernels for the present options. Otherwise the first call does, which takes a driver up to a second: call it while the app loads, perhaps on a clone in another thread.
     ///
     /// # Errors
     /// As [`GpuFinder::new`], and [`GpuError::Refused`].
@@ -186,23 +183,10 @@ impl GpuFinder {
         self.run(&Job::all(request), found).await.map_err(Failure::for_core)
     }
 
-    /// Finds the pairs that an update has changed, as [`PairDevice::find_changed`], without blocking.
-    ///
-    /// # Errors
-    /// As [`GpuFinder::find_all_async`].
-    pub async fn find_changed_async(
-        &mut self,
-        request: &ChangeRequest<'_>,
-        found: &mut DeviceFound,
-    ) -> Result<(), DeviceFailure> {
-        self.run(&Job::changes(request), found).await.map_err(Failure::for_core)
-    }
-
     async fn run(&mut self, job: &Job<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
         self.check_pause()?;
         let boxes = job.boxes.len();
         if let Some(why) = self.declined.unseen(boxes) {
-            self.forget();
             return Err(Failure::Declined(why));
         }
         let result = self.try_run(job, found).await;
@@ -287,20 +271,6 @@ impl PairDevice for GpuFinder {
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
         wait::block_on(self.run(&Job::all(request), found)).map_err(Failure::for_core)
-    }
-
-    fn find_changed(
-        &mut self,
-        request: &ChangeRequest<'_>,
-        found: &mut DeviceFound,
-    ) -> Result<(), DeviceFailure> {
-        wait::block_on(self.run(&Job::changes(request), found)).map_err(Failure::for_core)
-    }
-
-    fn forget(&mut self) {
-        if let Some(session) = &mut self.session {
-            session.storage.known = None;
-        }
     }
 
     fn name(&self) -> Option<&str> {

@@ -38,20 +38,6 @@ use Buffer::{Dispatches, LongRows};
 use Groups::{Direct, Indirect};
 use Step::{Clear, Run, RunOnRows};
 
-/// Returns the steps that apply uploaded changes.
-pub(super) fn apply_changes(params: &Params) -> [Step; 2] {
-    let longest = params.box_changes.max(params.filter_changes);
-    [
-        Clear(Buffer::Changed, changed_bytes(params.known)),
-        Run(&shaders::APPLY_CHANGES, Direct(longest.div_ceil(LANES))),
-    ]
-}
-
-/// Returns the bytes of a bit for each box.
-pub(super) fn changed_bytes(boxes: u32) -> u64 {
-    4 * u64::from(boxes.div_ceil(32))
-}
-
 /// Returns the steps that turn boxes into work items, without a round trip to the host, check the first of these, and sort
 /// the pairs if the flags say so and these items are expected to be all.
 pub(super) fn map_and_check(params: &Params, is_all: bool) -> Vec<Step> {

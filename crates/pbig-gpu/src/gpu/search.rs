@@ -6,10 +6,10 @@
 
 use super::GpuError;
 use super::error::Failure;
-use super::job::{Input, Job};
+use super::job::Job;
 use super::session::{Session, Sizes};
 use super::sink::Sink;
-use crate::layout::{BOX_BITS, DeviceBox, Motion, ordered};
+use crate::layout::{BOX_BITS, DeviceBox, ordered};
 use crate::pbig::sampled;
 use pbig_core::{Aabb, DeviceFound, Pair};
 
@@ -21,9 +21,8 @@ const _: () = assert!(MAX_BOXES_PER_CELL <= 1 << BOX_BITS, "an entry names each 
 const MIN_SPLIT_BOXES: usize = 256;
 
 /// Returns the most boxes that fit every buffer.
-fn max_boxes(job: &Job<'_>, session: &Session) -> usize {
-    let largest = if job.changed().is_some() { size_of::<Motion>() } else { size_of::<DeviceBox>() };
-    let by_bytes = session.storage.max_buffer_bytes / largest as u64;
+fn max_boxes(session: &Session) -> usize {
+    let by_bytes = session.storage.max_buffer_bytes / size_of::<DeviceBox>() as u64;
     by_bytes.min(MAX_BOXES_PER_CELL) as usize
 }
 
@@ -33,12 +32,10 @@ pub(super) async fn search(
     job: &Job<'_>,
     mut pairs: Vec<Pair>,
 ) -> Result<DeviceFound, Failure> {
-    // First, while the boxes are in the cache.
-    let restarted = job.changed().map_or_else(Vec::new, |changes| changes.restarted());
     let len = job.boxes.len();
     // The lists of a set say nothing about a set of another size.
     session.split = session.split.filter(|&(split, _)| split / 2 <= len && len / 2 <= split);
-    let mut most = max_boxes(job, session).min(session.split.map_or(usize::MAX, |(_, most)| most));
+    let mut most = max_boxes(session).min(session.split.map_or(usize::MAX, |(_, most)| most));
     loop {
         session.sink = Sink::new(std::mem::take(&mut pairs), job.max_pairs);
         let result = if len <= most {
@@ -53,22 +50,15 @@ pub(super) async fn search(
                 session.split = Some((len, most));
                 // A set that was too large says nothing about its parts.
                 (session.sizes, session.plan) = (Sizes::default(), None);
-                // The device may have gone on to the new boxes.
-                session.storage.known = None;
             }
             Err(failure) => return Err(failure),
-            Ok(()) => {
-                session.sink.found.restarted = restarted;
-                return Ok(std::mem::take(&mut session.sink).end());
-            }
+            Ok(()) => return Ok(std::mem::take(&mut session.sink).end()),
         }
     }
 }
 
 async fn search_whole(session: &mut Session, job: &Job<'_>) -> Result<(), Failure> {
     if job.boxes.len() < 2 {
-        // The device does not get the boxes, so it has no longer those of the last update.
-        session.storage.known = None;
         session.sink.found.valid = job.valid();
         return Ok(());
     }
@@ -76,29 +66,19 @@ async fn search_whole(session: &mut Session, job: &Job<'_>) -> Result<(), Failur
 }
 
 async fn search_parts(session: &mut Session, job: &Job<'_>, most: usize) -> Result<(), Failure> {
-    let bounds = job.bounds();
-    let (sorted, axis) = sorted(&bounds);
-    let parts = parts(&bounds, &sorted, axis, most / 2);
-    // The device gets one part after the other.
-    session.storage.known = None;
-    let motions = job.changed().map(|changes| changes.motions(0..job.boxes.len()));
+    let (sorted, axis) = sorted(job.boxes);
+    let parts = parts(job.boxes, &sorted, axis, most / 2);
     for part in &parts {
         let ids: Vec<u32> = [part.first, part.second].concat();
         let split = if part.second.is_empty() { 0 } else { part.first.len() as u32 };
-        let motions = motions.as_deref().map(|all| of_ids(all, &ids));
-        if motions.as_ref().is_some_and(|motions| motions.iter().all(|motion| motion.now == motion.before)) {
-            continue;
-        }
-        let (boxes, filters) = (of_ids(&bounds, &ids), job.filters.map(|all| of_ids(all, &ids)));
-        let input = motions.as_deref().map_or(Input::Boxes, Input::Motions);
+        let (boxes, filters) = (of_ids(job.boxes, &ids), job.filters.map(|all| of_ids(all, &ids)));
         let filters = filters.as_deref();
-        let (found, ended) = (session.sink.found.pairs.len(), session.sink.found.ended.len());
-        let part = Job { boxes: &boxes, input, filters, split: Some(split), is_sorted: false, ..*job };
+        let found = session.sink.found.pairs.len();
+        let part = Job { boxes: &boxes, filters, split: Some(split), is_sorted: false, ..*job };
         // Each part lies elsewhere.
         session.plan = None;
         session.run(&part).await?;
         name_pairs(&mut session.sink.found.pairs[found..], &ids);
-        name_pairs(&mut session.sink.found.ended[ended..], &ids);
     }
     session.plan = None;
     session.sink.found.valid = sorted.len() as u32;

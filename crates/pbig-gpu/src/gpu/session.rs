@@ -3,22 +3,18 @@
 use super::GpuError;
 use super::error::Failure;
 use super::gpu_device::GpuDevice;
-use super::job::{Input, Job};
+use super::job::Job;
 use super::kept_plan::KeptPlan;
 use super::readback::Timestamps;
 use super::sink::Sink;
-use super::storage::Storage;
-use super::upload::{upload_all, upload_changes};
+use super::storage::{Storage, Upload};
 use crate::GpuOptions;
 use crate::decode::pair_count;
 use crate::layout::{COUNTED, Counters, FILTERED, LANES, Params};
 use crate::policy::WIDEST_ITEM;
 use pbig_core::internal::Clock;
+use pbig_shaders::Buffer;
 use std::sync::Arc;
-
-/// Maximum number of words of output per changed box that are prefetched: four pairs. The output of a burst of pairs
-/// says nothing about an update with few changes.
-const PREFETCHED_WORDS_PER_CHANGE: u64 = 8;
 
 /// Number of boxes by which lists of the first call are longer than for the boxes there are: few boxes may need many entries.
 const EXTRA_BOXES: u64 = 4096;
@@ -49,10 +45,6 @@ pub(super) struct Session {
     pub(super) cell_factor: f32,
     /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
     pub(super) split: Option<(usize, usize)>,
-    /// This job searches for changes instead of all overlaps.
-    pub(super) finds_changes: bool,
-    /// Changes were uploaded that no submission has applied yet.
-    pub(super) has_pending_changes: bool,
     /// Entries of this job's map, once fetched.
     pub(super) table: Option<Vec<u32>>,
     /// Parameters of this job.
@@ -71,8 +63,6 @@ impl Session {
             plan: None,
             cell_factor: 1.0,
             split: None,
-            finds_changes: false,
-            has_pending_changes: false,
             table: None,
             params: Params::default(),
             sink: Sink::default(),
@@ -87,10 +77,9 @@ impl Session {
         }
     }
 
-    /// Forgets what a call without an answer has left: the device may have gone on to its boxes, and a plan that no search has
-    /// used was made for them.
+    /// Forgets what a call without an answer has left: a plan that no search has used was made for its boxes.
     pub(super) fn forget_call(&mut self) {
-        (self.storage.known, self.sink) = (None, Sink::default());
+        self.sink = Sink::default();
         self.plan.take_if(|kept| kept.is_new());
     }
 
@@ -125,25 +114,18 @@ impl Session {
             self.sizes.expected_words = 2 * job.boxes.len() as u64;
         }
         self.sizes.word_capacity = self.sizes.expected_words;
-        self.finds_changes = !matches!(job.input, Input::Boxes);
         self.params = self.params_of(job);
         let mut clock = Clock::start();
         // A failed upload leaves its bytes.
         self.storage.bytes_sent = 0;
-        let (storage, params, filters) = (&mut self.storage, &mut self.params, job.filters);
-        match job.input {
-            Input::Boxes => upload_all(storage, job.boxes, filters, params)?,
-            Input::Motions(motions) => upload_all(storage, motions, filters, params)?,
-            Input::Changes(changes) => {
-                let most = PREFETCHED_WORDS_PER_CHANGE * changes.changed.len() as u64;
-                self.sizes.expected_words = self.sizes.expected_words.min(most);
-                upload_changes(storage, changes, params)?;
-            }
-        };
+        self.storage.upload(&[
+            // All of them: to find those that have changed, the host would have to read a copy of the last call's, too, which takes longer.
+            Upload::new(Buffer::Boxes, job.boxes),
+            Upload::new(Buffer::Filters, job.filters.unwrap_or(&[])),
+        ])?;
         let report = &mut self.sink.found.report;
         report.uploaded += std::mem::take(&mut self.storage.bytes_sent);
         report.upload += clock.lap();
-        self.has_pending_changes = self.params.known > 0;
         Ok(())
     }
 
@@ -154,6 +136,7 @@ impl Session {
 
     fn params_of(&self, job: &Job<'_>) -> Params {
         Params {
+            boxes: job.boxes.len() as u32,
             small_cell: self.options.small_cell.clamp(1, LANES),
             // The output of a work item must fit the smallest buffer.
             columns: if self.storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
@@ -173,7 +156,7 @@ impl Session {
             let report = &mut self.sink.found.report;
             let kept = self.plan.get_or_insert_with(|| {
                 let mut clock = Clock::start();
-                let plan = KeptPlan::new(&job.bounds(), (options, factor), max_bytes);
+                let plan = KeptPlan::new(job.boxes, (options, factor), max_bytes);
                 report.plan += clock.lap();
                 plan
             });

@@ -5,12 +5,12 @@ use super::{GpuError, GpuFinder};
 use crate::GpuOptions;
 use crate::layout::ordered;
 use crate::pbig::sampled;
-use pbig_core::{Aabb, ChangeRequest, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
+use pbig_core::{Aabb, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 
 /// Fewest boxes for which a second device is asked.
 const FEWEST_BOXES: usize = 2048;
 
-/// Several devices that share the boxes of a search for all pairs. Updates go to the first one.
+/// Several devices that share the boxes of a call.
 #[derive(Clone, Debug)]
 pub struct GpuFinders {
     pub(super) finders: Vec<GpuFinder>,
@@ -135,18 +135,6 @@ impl PairDevice for GpuFinders {
         }
         let is_too_many = found.pairs.len() as u64 > request.max_pairs;
         if is_too_many { Err(DeviceFailure::TooManyPairs) } else { Ok(()) }
-    }
-
-    fn find_changed(
-        &mut self,
-        request: &ChangeRequest<'_>,
-        found: &mut DeviceFound,
-    ) -> Result<(), DeviceFailure> {
-        self.finders[0].find_changed(request, found)
-    }
-
-    fn forget(&mut self) {
-        self.finders[0].forget();
     }
 
     fn name(&self) -> Option<&str> {

@@ -33,7 +33,7 @@ impl Sink {
 
     /// Returns the number of pairs so far.
     pub(super) fn pairs(&self) -> u64 {
-        (self.found.pairs.len() + self.found.ended.len()) as u64
+        self.found.pairs.len() as u64
     }
 
     pub(super) fn left(&self) -> u64 {

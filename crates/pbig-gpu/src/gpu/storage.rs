@@ -2,11 +2,8 @@
 //! are hardly used. Lists go up through one staging buffer, which stays mapped between calls: the host copies each list once.
 
 use super::GpuError;
-use super::changes::Changes;
 use super::gpu_device::{GpuDevice, Variant};
-use super::upload::PIECE;
 use crate::GpuOptions;
-use crate::layout::BoxChange;
 use bytemuck::Pod;
 use pbig_core::internal::{self as parallel, threads_for};
 use pbig_shaders::{Buffer, Kernel};
@@ -23,7 +20,7 @@ const MIN_BUFFER_BYTES: u64 = 256;
 /// Largest size of a buffer that is kept however little it is used, in bytes.
 const ALWAYS_KEPT_BYTES: u64 = 1 << 16;
 
-/// Bytes that a thread copies at a time.
+/// Bytes that a thread copies at a time: a multiple of [`wgpu::MAP_ALIGNMENT`].
 const PIECE_BYTES: usize = 1 << 19;
 
 /// One of the two sets of buffers for chunks, 0 or 1: two chunks can be in progress (PBIG 5.3).
@@ -78,65 +75,19 @@ impl BufferId {
     }
 }
 
-/// A list for a buffer of the device, from this byte of the buffer on.
+/// A list for a buffer of the device.
 pub(super) struct Upload<'a> {
     buffer: Buffer,
-    at: u64,
-    content: Content<'a>,
-}
-
-/// A list, or a piece of one.
-#[derive(Clone, Copy)]
-enum Content<'a> {
-    Bytes(&'a [u8]),
-    /// Changes of boxes. They are made where they go: a list of them would take new memory in each call.
-    BoxChanges(Changes<'a>),
+    bytes: &'a [u8],
 }
 
 impl<'a> Upload<'a> {
-    /// A list of elements, from the element `start` on.
-    pub(super) fn new<T: Pod>(buffer: Buffer, start: usize, list: &'a [T]) -> Self {
-        let content = Content::Bytes(bytemuck::cast_slice(list));
-        Self { buffer, at: (start * size_of::<T>()) as u64, content }
+    pub(super) fn new<T: Pod>(buffer: Buffer, list: &'a [T]) -> Self {
+        Self { buffer, bytes: bytemuck::cast_slice(list) }
     }
 
-    /// The changes of boxes.
-    pub(super) fn of_box_changes(changes: Changes<'a>) -> Self {
-        Self { buffer: Buffer::BoxChanges, at: 0, content: Content::BoxChanges(changes) }
-    }
-}
-
-impl<'a> Content<'a> {
     fn len(&self) -> u64 {
-        match self {
-            Self::Bytes(bytes) => bytes.len() as u64,
-            Self::BoxChanges(changes) => (changes.changed.len() * size_of::<BoxChange>()) as u64,
-        }
-    }
-
-    /// Returns pieces for threads. Each but the last ends at a multiple of [`wgpu::MAP_ALIGNMENT`].
-    fn pieces(&self) -> Vec<Content<'a>> {
-        match *self {
-            Self::Bytes(bytes) => bytes.chunks(PIECE_BYTES).map(Content::Bytes).collect(),
-            Self::BoxChanges(changes) => {
-                let pieces = changes.changed.chunks(PIECE);
-                pieces.map(|changed| Content::BoxChanges(Changes { changed, ..changes })).collect()
-            }
-        }
-    }
-
-    /// Gives the bytes to `put`, each time with their place.
-    fn put(&self, mut put: impl FnMut(u64, &[u8])) {
-        match self {
-            Self::Bytes(bytes) => put(0, bytes),
-            Self::BoxChanges(changes) => {
-                let mut at = 0;
-                changes.put_box_changes(|block| {
-                    put(at, bytemuck::cast_slice(block));
-                    at += size_of_val(block) as u64;
-                });
-            }
-        }
+        self.bytes.len() as u64
     }
 }
 
@@ -155,8 +106,6 @@ pub(super) struct Storage {
     pub(super) max_buffer_bytes: u64,
     /// Bytes of lists that went up and were not yet reported.
     pub(super) bytes_sent: u64,
-    /// Number of boxes of the last update that the device has now and before; none if it has not seen that update.
-    pub(super) known: Option<usize>,
     buffers: HashMap<BufferId, KeptBuffer>,
     /// The host may write into the staging buffer.
     is_staging_mapped: Arc<AtomicBool>,
@@ -173,7 +122,6 @@ impl Storage {
             max_buffer_bytes: device.max_buffer_bytes(options),
             device,
             bytes_sent: 0,
-            known: None,
             buffers: HashMap::new(),
             is_staging_mapped: Arc::default(),
             copies: None,
@@ -182,7 +130,7 @@ impl Storage {
         }
     }
 
-    /// Makes a buffer at least `bytes` long. A buffer that has to grow loses its content; the result is then true.
+    /// Makes a buffer at least `bytes` long. Returns true if it is new: a buffer that has to grow loses its content.
     pub(super) fn ensure(&mut self, id: impl Into<BufferId>, bytes: u64) -> Result<bool, GpuError> {
         let (id, limit) = (id.into(), self.max_buffer_bytes);
         if bytes > limit {
@@ -226,40 +174,34 @@ impl Storage {
         Ok(())
     }
 
-    /// Writes lists into the staging buffer, from where the next submission copies them into their buffers.
-    pub(super) fn stage(&mut self, uploads: &[Upload<'_>]) -> Result<(), GpuError> {
+    /// Makes the buffers of lists, and writes these into the staging buffer, from where the next submission copies them.
+    pub(super) fn upload(&mut self, uploads: &[Upload<'_>]) -> Result<(), GpuError> {
         // A call that failed before it was submitted leaves copies behind.
         self.copies = None;
-        let lens = uploads.iter().map(|upload| upload.content.len());
-        let bytes: u64 = lens.clone().map(aligned).sum();
-        self.bytes_sent += lens.sum::<u64>();
+        for upload in uploads {
+            self.ensure(upload.buffer, upload.len())?;
+        }
+        let bytes: u64 = uploads.iter().map(|upload| aligned(upload.len())).sum();
+        self.bytes_sent += uploads.iter().map(Upload::len).sum::<u64>();
         if bytes > self.max_buffer_bytes {
             // Each list fits a buffer, but not all together.
-            for Upload { buffer, at, content } in uploads {
-                let (to, mut at) = (self.get(*buffer), *at);
-                for piece in content.pieces() {
-                    let mut bytes = Vec::new();
-                    piece.put(|_, part| bytes.extend_from_slice(part));
-                    self.device.queue.write_buffer(to, at, &bytes);
-                    at += piece.len();
-                }
-            }
+            let write = |up: &Upload<'_>| self.device.queue.write_buffer(self.get(up.buffer), 0, up.bytes);
+            uploads.iter().for_each(write);
             return Ok(());
         }
-        if bytes == 0 {
-            return Ok(());
-        }
+        if bytes == 0 { Ok(()) } else { self.stage(bytes, uploads) }
+    }
+
+    /// Writes lists into the staging buffer, and records their copies.
+    fn stage(&mut self, bytes: u64, uploads: &[Upload<'_>]) -> Result<(), GpuError> {
         self.map_staging(bytes)?;
         let pieces = self.record_copies(uploads);
         let staging = self.get(BufferId::UploadStaging);
         let has_failed = AtomicBool::new(false);
         parallel::run(threads_for(pieces.len()), pieces.len(), |_, i| {
-            let (from, piece) = &pieces[i];
-            match staging.get_mapped_range_mut(*from..from + piece.len()) {
-                Ok(mut view) => piece.put(|at, bytes| {
-                    let at = at as usize;
-                    view.slice(at..at + bytes.len()).copy_from_slice(bytes);
-                }),
+            let (from, piece) = pieces[i];
+            match staging.get_mapped_range_mut(from..from + piece.len() as u64) {
+                Ok(mut view) => view.copy_from_slice(piece),
                 Err(_) => has_failed.store(true, Ordering::Relaxed),
             }
         });
@@ -272,15 +214,16 @@ impl Storage {
     }
 
     /// Gives each list a place in the staging buffer, and records its copy. Returns the pieces that threads write there.
-    fn record_copies<'a>(&mut self, uploads: &[Upload<'a>]) -> Vec<(u64, Content<'a>)> {
+    fn record_copies<'a>(&mut self, uploads: &[Upload<'a>]) -> Vec<(u64, &'a [u8])> {
         let (mut pieces, mut from) = (Vec::new(), 0);
         let mut encoder = self.device.encoder();
         let staging = self.get(BufferId::UploadStaging);
-        for Upload { buffer, at, content } in uploads.iter().filter(|upload| upload.content.len() > 0) {
-            encoder.copy_buffer_to_buffer(staging, from, self.get(*buffer), *at, content.len());
-            for piece in content.pieces() {
+        for upload in uploads.iter().filter(|upload| upload.len() > 0) {
+            encoder.copy_buffer_to_buffer(staging, from, self.get(upload.buffer), 0, upload.len());
+            // Each but the last ends at a multiple of the alignment.
+            for piece in upload.bytes.chunks(PIECE_BYTES) {
                 pieces.push((from, piece));
-                from += piece.len();
+                from += piece.len() as u64;
             }
             from = aligned(from);
         }

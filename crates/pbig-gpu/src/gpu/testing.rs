@@ -40,15 +40,14 @@ impl GpuFinder {
         }
     }
 
-    /// Returns a kernel's pipeline. If the kernel has two texts, `changes` picks the one for a search for changes.
+    /// Returns a kernel's pipeline.
     pub fn pipeline(
         &self,
         kernel: &'static Kernel,
         options: &GpuOptions,
-        changes: bool,
     ) -> Result<wgpu::ComputePipeline, GpuError> {
         let device = self.device.as_ref().ok_or(GpuError::Lost)?;
-        wait::block_on(device.watch(async || Ok(device.pipeline(kernel, Variant::new(options, changes)))))
+        wait::block_on(device.watch(async || Ok(device.pipeline(kernel, Variant::new(options)))))
     }
 
     /// Returns the number of kernels that were compiled for the device.

@@ -2,7 +2,6 @@
 
 pub(super) mod edit;
 mod listed;
-pub(super) mod on_device;
 mod partners;
 mod rebuild;
 mod sweep;
@@ -10,6 +9,7 @@ mod tree;
 
 use super::world::World;
 use crate::all_pairs::Store;
+use crate::device_slot::DeviceSlot;
 use crate::holder::Holder;
 use crate::memory::Scratch;
 use crate::outcome::Outcome;
@@ -41,8 +41,13 @@ impl Engines {
             Engine::Sweep => self.sweep.run(task),
             Engine::Edit => self.edit.run(task),
             Engine::Tree => self.tree.run(task),
-            Engine::Rebuild => self.rebuild.run(task),
+            Engine::Rebuild => self.rebuild.run(task, None),
         }
+    }
+
+    /// Rebuilds with the pairs that a device finds.
+    pub(super) fn run_on(&mut self, device: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
+        self.rebuild.run(task, Some(device))
     }
 }
 
