@@ -10,6 +10,9 @@ use pbig_core::{Aabb, BroadPhase, Error, Events, Pair, ProxyFilter};
 use std::collections::BTreeSet;
 use std::iter::Peekable;
 
+/// Speeds that f32 has, and their reciprocals.
+const SPEEDS: std::ops::Range<f64> = 1e-30..1e38;
+
 /// A closed AABB in f64. It is valid if `min <= max` on all axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WideAabb {
@@ -298,17 +301,21 @@ impl BoxStore<WideAabb> for WideBoxes {
         WideAabb { min: absolute(aabb.min), max: absolute(aabb.max) }
     }
 
-    /// If the direction overflows f32, all boxes are met at once.
+    /// If the motion is not one in f32, all boxes are met at once.
     fn narrow_motion(&self, start: &WideAabb, velocity: &[f64; 3]) -> (Aabb, [f32; 3]) {
-        let narrow = velocity.map(|x| x as f32);
-        if velocity.iter().any(|x| x.is_nan()) || narrow.iter().all(|x| x.is_finite()) {
-            return (self.to_core(start), narrow);
+        let (aabb, narrow) = (self.to_core(start), velocity.map(|x| x as f32));
+        let speed = velocity.iter().fold(0.0, |speed: f64, x| speed.max(x.abs()));
+        let is_near = aabb.min.iter().chain(&aabb.max).all(|x| x.is_finite());
+        if velocity.iter().any(|x| x.is_nan()) || is_near && (speed == 0.0 || SPEEDS.contains(&speed)) {
+            return (aabb, narrow);
         }
         (Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]), [0.0; 3])
     }
 
     fn narrow_point(&self, point: &[f64; 3]) -> [f32; 3] {
-        std::array::from_fn(|k| (point[k] - self.centre[k]) as f32)
+        // No number that is not finite, which no box is near.
+        let near = |x: f64| if x.is_nan() { f64::NAN } else { x.clamp(f32::MIN.into(), f32::MAX.into()) };
+        std::array::from_fn(|k| near(point[k] - self.centre[k]) as f32)
     }
 
     fn narrow_box(&self, aabb: &WideAabb) -> Aabb {

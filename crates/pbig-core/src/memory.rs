@@ -64,7 +64,7 @@ impl<T> ShrinkingVec<T> {
             self.piece = self.piece.max((capacity - wanted).div_ceil(PIECES)).max(SMALL);
         }
         if self.piece > 0 && capacity > wanted {
-            let left = wanted.max(capacity - self.piece);
+            let left = wanted.max(capacity.saturating_sub(self.piece));
             self.list.truncate(left);
             self.list.shrink_to(left);
         }
@@ -147,6 +147,16 @@ mod tests {
         assert!(capacities[199] <= 12_500 + SMALL, "{capacities:?}");
         let pieces = capacities.windows(2).map(|two| two[0] - two[1]);
         assert!(pieces.max().is_some_and(|piece| piece <= 1_000_000 / PIECES), "{capacities:?}");
+    }
+
+    /// The last piece is less than one of the pieces of the peak.
+    #[test]
+    fn a_list_shrinks_by_less_than_a_piece_of_a_higher_peak() {
+        let mut pool = pool(2_000_000);
+        (0..160).for_each(|_| pool.settle(20_000));
+        let before = pool.capacity();
+        (0..200).for_each(|_| pool.settle(1000));
+        assert!(before >= 25_000 && pool.capacity() <= 1250 + SMALL, "{before}, {}", pool.capacity());
     }
 
     #[test]

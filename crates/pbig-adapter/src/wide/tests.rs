@@ -190,6 +190,24 @@ fn narrow_queries_meet_what_the_wide_ones_meet() {
     assert!(hits > 100, "{hits}");
 }
 
+/// Speeds and places that f32 has not.
+#[test]
+fn queries_beyond_f32_meet_all_boxes() {
+    let mut world = World::new();
+    (0..100).for_each(|id| world.place(id, 0.0, 30.0));
+    world.update();
+    let everywhere = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
+    let from = |x: f64| WideAabb { min: [x, 0.0, 0.0], max: [x, 0.0, 0.0] };
+    for (start, speed) in [(0.0, 1e-50), (0.0, 1e-44), (0.0, 1e39), (1e39, 1.0), (1e39, -1e38)] {
+        assert_eq!(world.boxes.narrow_motion(&from(start), &[speed, 0.0, 0.0]), (everywhere, [0.0; 3]));
+    }
+    // A tiny component beside another one, as rotations leave it.
+    let (start, velocity) = world.boxes.narrow_motion(&from(0.0), &[1.0, 1e-48, 0.0]);
+    assert!(start != everywhere && velocity == [1.0, 0.0, 0.0]);
+    let point = world.boxes.narrow_point(&[1e39, -1e300, f64::NAN]);
+    assert!(point[0] == f32::MAX && point[1] == f32::MIN && point[2].is_nan(), "{point:?}");
+}
+
 /// The centre of such a world, rounded to a multiple of its margin, is infinite.
 #[test]
 fn a_world_at_the_end_of_the_numbers_keeps_its_pairs() {

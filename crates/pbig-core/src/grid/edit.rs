@@ -11,6 +11,7 @@ use super::search::KeyRun;
 use super::search::Sorted;
 use super::simd::{Simd, dispatch, prefetch};
 use super::spacing::GridPlan;
+use crate::memory::ShrinkingVec;
 use crate::policy::search::WORK_OF_EXACT_TEST;
 use crate::{Aabb, Algorithm, Plan};
 
@@ -30,25 +31,35 @@ pub(crate) struct EditedGrid {
 /// Boxes by cell, as linked lists.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Spill {
-    records: Vec<Record>,
+    records: ShrinkingVec<Record>,
     /// By entry: the one behind it and the one before it in its list.
-    next: Vec<u32>,
-    before: Vec<u32>,
-    free: Vec<u32>,
+    next: ShrinkingVec<u32>,
+    before: ShrinkingVec<u32>,
+    free: ShrinkingVec<u32>,
     /// By cell: the first entry. Empty until the first box moves.
-    heads: Vec<u32>,
+    heads: ShrinkingVec<u32>,
     /// A bit for each cell: whether it has entries.
-    occupied: Vec<u64>,
+    occupied: ShrinkingVec<u64>,
 }
 
 impl EditedGrid {
     /// Gives back memory that the boxes of the last search did not need.
     pub(crate) fn settle(&mut self, holds_boxes: bool) {
         self.grid.settle(holds_boxes);
+        self.spill.settle();
     }
 }
 
 impl Spill {
+    fn settle(&mut self) {
+        let entries = self.records.len();
+        self.records.settle(entries);
+        [&mut self.next, &mut self.before, &mut self.free].into_iter().for_each(|list| list.settle(entries));
+        let cells = if self.is_empty() { 0 } else { self.heads.len() };
+        self.heads.settle(cells);
+        self.occupied.settle(cells.div_ceil(64) + 2);
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.records.len() == self.free.len()
     }
@@ -105,7 +116,7 @@ impl Spill {
 
     /// Forgets all entries.
     fn clear(&mut self) {
-        for record in &self.records {
+        for record in self.records.iter() {
             if let Some(head) = self.heads.get_mut(record.key as usize) {
                 *head = NONE;
                 self.occupied[record.key as usize / 64] = 0;

@@ -93,8 +93,8 @@ impl BoxIndex {
     /// `visit` returns the time until which further boxes are wanted; boxes that are met just after it may be visited as well. After
     /// a time of 0 only boxes that are met at time 0 are visited, and of these (unless `max_time` is 0) only those with lower ids: so
     /// a caller that takes the lowest id of several at one time needs no others. After a negative time none is visited. No box is
-    /// visited twice. With a NaN in the query, or a negative `max_time`, no box is visited. Returns the number of nodes, of eight
-    /// boxes each, that were tested.
+    /// visited twice. With a NaN in the query, or a negative `max_time`, no box is visited. A box may be missed if its distance, or the
+    /// time until it is met, is too large for `f32`. Returns the number of nodes, of eight boxes each, that were tested.
     #[inline(always)]
     pub fn cast_aabb(
         &self,

@@ -119,6 +119,11 @@ impl BoxIndex {
             return self.lay_out(boxes, None);
         }
         self.read_all(boxes);
+        // After a peak, most leaves are empty.
+        let full = self.bounds[..self.leaves as usize].iter().filter(|bounds| bounds.is_valid()).count();
+        if policy::FULL_LEAVES_SHARE * full < self.leaves as usize {
+            return self.lay_out(boxes, self.is_sorted.then_some(u32::MAX));
+        }
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         for (id, aabb) in boxes.iter().enumerate() {
             if self.places[id] == NONE && aabb.is_valid() {

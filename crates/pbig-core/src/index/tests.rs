@@ -286,6 +286,57 @@ fn a_crowd_of_queries_pays_for_a_sort_and_single_ones_do_not() {
     }
 }
 
+/// Returns the mean number of nodes that rays look at, straight down from random places.
+fn look_down(index: &BoxIndex, side: f32) -> u64 {
+    let mut rng = StdRng::seed_from_u64(4);
+    let mut one = || {
+        let place = [rng.random_range(0.0..side), rng.random_range(0.0..side), 1e4];
+        index.cast_aabb(&Aabb::new(place, place), [0.0, 0.0, -1.0], f32::MAX, |_| f32::MAX)
+    };
+    (0..100).map(|_| one()).sum::<u64>() / 100
+}
+
+/// Tiles, and terraces: a cut between heights would leave nodes as wide as the world.
+#[test]
+fn flat_boxes_at_many_heights_are_not_cut_into_slabs() {
+    let mut rng = StdRng::seed_from_u64(5);
+    let side = 300.0;
+    for (thickness, heights) in [(0.0, 1.0), (0.0, 1e-3), (1e-6, 1.0), (1e-3, 10.0), (0.01, 10.0), (0.0, 0.0)]
+    {
+        let mut tile = || {
+            let [x, y, z] = [side, side, heights].map(|most| rng.random_range(0.0..=most));
+            Aabb::new([x, y, z], [x + 2.0, y + 2.0, z + thickness])
+        };
+        let boxes: Vec<Aabb> = (0..10_000).map(|_| tile()).collect();
+        let mut index = BoxIndex::default();
+        index.sort(&boxes);
+        let nodes = look_down(&index, side);
+        assert!(nodes < 20, "tiles {thickness} thick, heights up to {heights}: {nodes} nodes a ray");
+    }
+}
+
+/// A list that has become short, and one whose boxes are gone.
+#[test]
+fn an_index_forgets_a_peak() {
+    let boxes = scattered(100_000);
+    for is_sorted in [false, true] {
+        for rest in [
+            boxes[..500].to_vec(),
+            boxes[..500].iter().copied().chain(std::iter::repeat_n(Aabb::NOWHERE, 99_500)).collect(),
+        ] {
+            let mut index = BoxIndex::default();
+            index.refresh(&boxes, None);
+            if is_sorted {
+                index.sort(&boxes);
+            }
+            index.refresh(&rest, None);
+            assert!(index.nodes.len() < 100, "{} nodes for 500 boxes", index.nodes.len());
+            assert_eq!(index.is_sorted, is_sorted);
+            check(&index, &rest, &mut StdRng::seed_from_u64(1), 70.0);
+        }
+    }
+}
+
 /// Boxes that come after a sort make queries slow only until these have paid for the next one.
 #[test]
 fn later_boxes_are_sorted_in_once_queries_have_paid() {

@@ -20,6 +20,9 @@ pub(crate) fn nodes_for_sort(leaves: u32, ids: usize) -> u64 {
     64 + 256 * u64::from(leaves) + ids as u64 / 4
 }
 
+/// Minimum share of leaves with a box, as one in this number, for a layout to stay when all boxes are read.
+pub(crate) const FULL_LEAVES_SHARE: usize = 4;
+
 /// Minimum share of the maximum number of leaves outside the tree, as one in this number, for the order to be bad.
 pub(crate) const FEW_LOOSE_SHARE: usize = 8;
 
