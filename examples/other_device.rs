@@ -22,24 +22,6 @@ impl PairDevice for Thread {
         Ok(())
     }
 
-    fn find_changed(
-        &mut self,
-        now: &ChangeRequest<'_>,
-        found: &mut DeviceFound,
-    ) -> Result<(), DeviceFailure> {
-        let (mut boxes, mut filters) = (now.boxes.to_vec(), now.filters.to_vec());
-        for was in now.changed {
-            (boxes[was.id as usize], filters[was.id as usize]) = (was.aabb, was.filter);
-        }
-        let (before, after) = (pairs(&boxes, &filters)?, pairs(now.boxes, now.filters)?);
-        found.valid = now.boxes.iter().filter(|one| one.is_valid()).count() as u32;
-        found.pairs = after.iter().filter(|pair| !before.contains(pair)).copied().collect();
-        found.ended = before.iter().filter(|pair| !after.contains(pair)).copied().collect();
-        Ok(())
-    }
-
-    fn forget(&mut self) {}
-
     fn name(&self) -> Option<&str> {
         Some("a thread")
     }

@@ -101,18 +101,18 @@ compile() {
 }
 
 run_fxc() {
-    local text kernel search rest seconds faults=0
+    local text kernel rest seconds faults=0
     needs FXC wine x86_64-w64-mingw32-gcc npm || return 0
     install_dawn
     texts
     export WINEPREFIX=$out/wine WINEDEBUG=-all WINEDLLOVERRIDES='d3dcompiler_47=n;mscoree,mshtml='
     x86_64-w64-mingw32-gcc -O1 -o "$out/fxc.exe" "$compilers/fxc.c" -ld3dcompiler_47
     cp wasm/gpu/node_modules/webgpu/dist/win32-x64/d3dcompiler_47.dll "$out"
-    echo kernel,search,seconds >"$out/fxc.csv"
+    echo kernel,seconds >"$out/fxc.csv"
     for text in "$out"/texts/*.hlsl; do
-        IFS=. read -r kernel search rest <<<"${text##*/}"
+        IFS=. read -r kernel rest <<<"${text##*/}"
         seconds=$(compile "$text" "$kernel") || faults=$((faults + 1))
-        echo "$kernel,$search,$seconds" >>"$out/fxc.csv"
+        echo "$kernel,$seconds" >>"$out/fxc.csv"
     done
     cat "$out/fxc.csv"
     [ "$faults" = 0 ]
@@ -124,29 +124,29 @@ statistic() {
 }
 
 run_amd() {
-    local text kernel search bindings rest file
+    local text kernel bindings rest file
     file=$(driver radeon)
     needs "AMD's compiler" "$file" cc /usr/include/vulkan/vulkan.h || return 0
     texts
     cc -O1 -o "$out/statistics" "$compilers/statistics.c" -lvulkan
     # Without a device the driver compiles for the family that is named: RDNA 2, as in Radeon RX 6800.
     export VK_DRIVER_FILES=$file RADV_FORCE_FAMILY=navi21
-    echo kernel,search,vgprs,sgprs,spilled,waves,shared_bytes,code_bytes,cycles >"$out/amd.csv"
+    echo kernel,vgprs,sgprs,spilled,waves,shared_bytes,code_bytes,cycles >"$out/amd.csv"
     for text in "$out"/texts/*.spv; do
-        IFS=. read -r kernel search bindings rest <<<"${text##*/}"
+        IFS=. read -r kernel bindings rest <<<"${text##*/}"
         "$out/statistics" "$text" "$kernel" "$bindings" >"$out/statistics.txt"
-        echo "$kernel,$search,$(statistic VGPRs),$(statistic 'Pre-Sched SGPRs'),$(($(statistic 'Spilled SGPRs') + \
+        echo "$kernel,$(statistic VGPRs),$(statistic 'Pre-Sched SGPRs'),$(($(statistic 'Spilled SGPRs') + \
             $(statistic 'Spilled VGPRs'))),$(statistic 'Subgroups per SIMD'),$(statistic 'LDS size'),$(statistic \
             'Code size'),$(statistic 'Inverse Throughput')" >>"$out/amd.csv"
     done
     cat "$out/amd.csv"
-    awk -F, 'NR > 1 && $5 != 0 { print $1 " spills registers"; faults++ } END { exit faults > 0 }' "$out/amd.csv"
+    awk -F, 'NR > 1 && $4 != 0 { print $1 " spills registers"; faults++ } END { exit faults > 0 }' "$out/amd.csv"
 }
 
 # Both tables have the kernels in one order.
 run_table() {
     needs "a table" "$out/fxc.csv" "$out/amd.csv" || return 0
-    paste -d , "$out/fxc.csv" <(cut -d , -f 3- "$out/amd.csv") >docs/benchmarks/results/gpu-compilers.csv
+    paste -d , "$out/fxc.csv" <(cut -d , -f 2- "$out/amd.csv") >docs/benchmarks/results/gpu-compilers.csv
 }
 
 # validated CHECKS COMMAND...: runs a command under the validation layer, and fails if the layer has to say something.

@@ -1,9 +1,7 @@
 //! The GPU as the page's broad phase asks it. In a browser the answer comes later, and rapier's step cannot be left and
 //! entered again. So the browser suspends the whole module until then (WebAssembly's JavaScript promise integration).
 
-use pbig_core::{
-    Aabb, ChangeRequest, DeviceFailure, DeviceFound, Pair, PairDevice, ProxyFilter, SearchRequest,
-};
+use pbig_core::{Aabb, DeviceFailure, DeviceFound, Pair, PairDevice, ProxyFilter, SearchRequest};
 
 /// Returns all pairs of the boxes that their filters, if any, allow; none if the device declines the call.
 pub(crate) type FindAll = fn(&[Aabb], Option<&[ProxyFilter]>) -> Option<Vec<Pair>>;
@@ -19,43 +17,15 @@ impl RemoteDevice {
     pub(crate) fn gpu() -> Self {
         Self { find_all: find_on_gpu }
     }
-
-    fn pairs(
-        &self,
-        boxes: &[Aabb],
-        filters: Option<&[ProxyFilter]>,
-        max: u64,
-    ) -> Result<Vec<Pair>, DeviceFailure> {
-        let declined = || DeviceFailure::Declined("the GPU declined the boxes: the CPU does the work".into());
-        let pairs = (self.find_all)(boxes, filters).ok_or_else(declined)?;
-        if pairs.len() as u64 > max { Err(DeviceFailure::TooManyPairs) } else { Ok(pairs) }
-    }
 }
 
 impl PairDevice for RemoteDevice {
     fn find_all(&mut self, all: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), DeviceFailure> {
-        found.pairs = self.pairs(all.boxes, all.filters, all.max_pairs)?;
+        let declined = || DeviceFailure::Declined("the GPU declined the boxes: the CPU does the work".into());
+        found.pairs = (self.find_all)(all.boxes, all.filters).ok_or_else(declined)?;
         found.valid = all.boxes.iter().filter(|one| one.is_valid()).count() as u32;
-        Ok(())
+        if found.pairs.len() as u64 > all.max_pairs { Err(DeviceFailure::TooManyPairs) } else { Ok(()) }
     }
-
-    /// Every changed box starts over: the device gives all its pairs, and the core finds those that have ended.
-    fn find_changed(
-        &mut self,
-        now: &ChangeRequest<'_>,
-        found: &mut DeviceFound,
-    ) -> Result<(), DeviceFailure> {
-        let mut is_changed = vec![false; now.boxes.len()];
-        now.changed.iter().for_each(|was| is_changed[was.id as usize] = true);
-        let max = now.kept.saturating_add(now.max_pairs);
-        found.pairs = self.pairs(now.boxes, Some(now.filters), max)?;
-        found.pairs.retain(|pair| is_changed[pair.a as usize] || is_changed[pair.b as usize]);
-        found.restarted = (0..).zip(&is_changed).filter(|it| *it.1).map(|it| it.0).collect();
-        found.valid = count_valid(now);
-        Ok(())
-    }
-
-    fn forget(&mut self) {}
 
     fn name(&self) -> Option<&str> {
         Some("WebGPU")
@@ -68,14 +38,6 @@ impl PairDevice for RemoteDevice {
     fn clone_box(&self) -> Box<dyn PairDevice> {
         Box::new(self.clone())
     }
-}
-
-/// Returns the number of boxes that are valid now or were at the last update.
-fn count_valid(now: &ChangeRequest<'_>) -> u32 {
-    let valid = now.boxes.iter().filter(|one| one.is_valid()).count();
-    let has_ended =
-        now.changed.iter().filter(|was| was.aabb.is_valid() && !now.boxes[was.id as usize].is_valid());
-    (valid + has_ended.count()) as u32
 }
 
 /// Asks the page's GPU, and suspends the module until it answers. A failure ends the step with the GPU's error.

@@ -55,7 +55,6 @@ impl Follower {
     fn assert_done_as_asked(&self, what: &str) {
         let report = self.broad_phase.report();
         assert_eq!(report.fallback, None, "{what}");
-        // With fewer boxes a device may still be asked for ended pairs.
         let searched = report.changed > 0 && report.boxes - report.invalid > 1;
         let on_gpu = report.device.is_some();
         match self.broad_phase.config().backend {

@@ -6,8 +6,8 @@ mod turns;
 mod work;
 
 use pbig_core::{
-    Aabb, Backend, ChangeRequest, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order,
-    Pair, PairDevice, ProxyFilter, SearchRequest,
+    Aabb, Backend, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order, Pair,
+    PairDevice, ProxyFilter, SearchRequest,
 };
 use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
 use pbig_tests::{Way, difference, gpu, needs_gpu};
@@ -215,7 +215,7 @@ fn packed_output_is_an_eighth_in_crowds_and_not_the_default() {
     assert!(packed.into_iter().all(|ratio| ratio < 0.14), "{packed:?}");
 }
 
-/// A world of one part whose first update has more events than a buffer holds: the device cannot sort them.
+/// A world of one part whose first update has more events than a buffer holds.
 #[test]
 fn more_events_than_a_buffer_holds_are_complete() {
     needs_gpu!();
@@ -284,16 +284,6 @@ struct Hardware(GpuFinder);
 impl PairDevice for Hardware {
     fn find_all(&mut self, request: &SearchRequest<'_>, to: &mut DeviceFound) -> Result<(), DeviceFailure> {
         self.0.find_all(request, to)
-    }
-    fn find_changed(
-        &mut self,
-        request: &ChangeRequest<'_>,
-        to: &mut DeviceFound,
-    ) -> Result<(), DeviceFailure> {
-        self.0.find_changed(request, to)
-    }
-    fn forget(&mut self) {
-        self.0.forget();
     }
     fn name(&self) -> Option<&str> {
         self.0.name()

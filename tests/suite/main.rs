@@ -3,7 +3,6 @@
 mod between;
 mod bounded;
 mod calls;
-mod changes;
 mod checked;
 mod differences;
 mod documents;

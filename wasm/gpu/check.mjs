@@ -139,7 +139,8 @@ async function checkAll(module, tell) {
         const { failed } = await withTexts(change, () => module.run(0, 300));
         tell(`planted fault, ${fault}: ${failed} sets failed`);
         isRight &&= failed > 0;
-        for (const name of ["random sets", "random changes"]) {
+        // An update drops pairs that come twice.
+        for (const name of fault === "no owner" ? ["random sets"] : ["random sets", "random changes"]) {
             const part = await inTime(1800, name, withTexts(change, () => module.run_part(name)));
             tell(`planted fault, ${fault}, ${name}: ${part.fault || "not noticed"}`);
             isRight &&= noticed.test(part.fault);

@@ -137,7 +137,7 @@ pub struct Report {
 pub struct DeviceReport {
     /// The name of the device.
     pub name: String,
-    /// Time of the host: copying boxes or changes into the device's staging memory.
+    /// Time of the host: copying boxes into the device's staging memory.
     pub upload: Duration,
     /// Time of the host: choosing cells. Zero where the plan of an earlier call is kept.
     pub plan: Duration,

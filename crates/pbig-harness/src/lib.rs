@@ -11,7 +11,6 @@ pub mod checks;
 pub mod corpus;
 #[cfg(feature = "run")]
 pub mod counting;
-pub mod device_world;
 #[cfg(feature = "run")]
 pub mod field;
 #[cfg(feature = "files")]

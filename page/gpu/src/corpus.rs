@@ -10,12 +10,11 @@ mod random;
 mod relay;
 
 use crate::to_js;
-use modes::{MODES, Mode, filters};
-use pbig_core::{Aabb, DeviceFound, PairDevice};
+use modes::MODES;
+use pbig_core::Aabb;
 use pbig_gpu::GpuFinder;
-use pbig_harness::boxes::{BoxSet, moved};
+use pbig_harness::boxes::BoxSet;
 use pbig_harness::corpus::{Case, corpus};
-use pbig_harness::device_world::DeviceWorld;
 use std::future::poll_fn;
 use std::pin::pin;
 use std::task::Poll;
@@ -73,7 +72,7 @@ pub async fn run(mode: usize, most_boxes: usize) -> Result<Outcome, JsError> {
     // Later sets meet the buffers and the plan of the earlier ones.
     let mut gpu = gpu.with_options(mode.options());
     for set in sets(most_boxes.min(mode.most_boxes)) {
-        let result = run_set(&mut gpu, mode, &set.boxes).await;
+        let result = modes::check(&mut gpu, mode, &set.boxes).await;
         outcome.count(&set.name, result);
     }
     Ok(outcome)
@@ -103,30 +102,6 @@ async fn interrupted(gpu: &mut GpuFinder, beside: &mut GpuFinder) -> Result<(), 
     }
     modes::check(gpu, mode, &boxes).await?;
     modes::check(beside, mode, &boxes).await.map(|_| ())
-}
-
-async fn run_set(gpu: &mut GpuFinder, mode: &Mode, boxes: &[Aabb]) -> Result<usize, String> {
-    if mode.finds_changes { follow(gpu, boxes).await } else { modes::check(gpu, mode, boxes).await }
-}
-
-/// Compares the changes of an update in which all boxes are new, and of one in which every third moves. Returns their number.
-async fn follow(gpu: &mut GpuFinder, boxes: &[Aabb]) -> Result<usize, String> {
-    gpu.forget();
-    let mut world = DeviceWorld::default();
-    (0..).zip(boxes).zip(filters(boxes.len())).for_each(|((id, aabb), filter)| world.set(id, *aabb, filter));
-    let first = update(gpu, &mut world).await?;
-    let shifted = moved(boxes, 0.5, 3);
-    (0..).zip(shifted).step_by(3).for_each(|(id, aabb)| world.put(id, aabb));
-    Ok(first + update(gpu, &mut world).await?)
-}
-
-async fn update(gpu: &mut GpuFinder, world: &mut DeviceWorld) -> Result<usize, String> {
-    let changed = world.changes();
-    let mut found = DeviceFound::default();
-    let done = gpu.find_changed_async(&world.request(&changed), &mut found).await;
-    done.map_err(|failure| format!("{failure:?}"))?;
-    world.take(&found)?;
-    Ok(found.pairs.len() + found.ended.len())
 }
 
 /// Returns the sets of at most this number of boxes: the corpus, and larger ones.

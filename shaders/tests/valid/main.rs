@@ -16,8 +16,8 @@ fn parse(kernel: &Kernel) -> naga::Module {
 fn validate(kernel: &Kernel) -> (naga::Module, ModuleInfo) {
     let module = parse(kernel);
     let result = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
-    let info = result
-        .unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&kernel.source())));
+    let info =
+        result.unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&kernel.source())));
     (module, info)
 }
 

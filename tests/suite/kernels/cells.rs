@@ -14,8 +14,7 @@ fn all_sizes() -> Vec<f32> {
 
 /// Returns a call whose only level is not divided, so that `locate` returns cells at the finest resolution.
 fn undivided(boxes: Vec<Aabb>, tick_exponent: i32, cells_per_tick: u32) -> State {
-    let mut state =
-        State::new(&Case { name: "points", boxes, before: Vec::new(), small_cell: 32, columns: 8 });
+    let mut state = State::new(&Case { name: "points", boxes, small_cell: 32, columns: 8 });
     state.params = Params { tick_exponent, cells_per_tick, levels: 1, cells: 1, ..state.params };
     state.params.level[0] = Level { dims: [1; 3], ..Level::default() };
     state

@@ -16,7 +16,7 @@ impl TestedPairs {
     pub(super) fn test_entries(&mut self, s: &State, a: u32, b: u32) {
         let (i, j) = (box_of(a), box_of(b));
         let split = s.params.split;
-        if !may_be_wanted(s, a | b) || (split > 0 && (i < split) == (j < split)) {
+        if !may_own(a | b) || (split > 0 && (i < split) == (j < split)) {
             self.made += 1;
             self.redundant += 1;
         } else {
@@ -26,7 +26,8 @@ impl TestedPairs {
 
     pub(super) fn test_boxes(&mut self, s: &State, i: u32, j: u32) {
         self.made += 1;
-        if !s.is_wanted(i as usize, j as usize) {
+        let [one, other] = [i, j].map(|id| DeviceBox::new(&s.boxes[id as usize]));
+        if !overlap(&one, &other) {
             return;
         }
         self.overlaps += 1;
@@ -56,7 +57,12 @@ pub(super) fn box_of(entry: u32) -> u32 {
     entry & ((1 << BOX_BITS) - 1)
 }
 
-pub(super) fn overlap(a: &DeviceBox, b: &DeviceBox) -> bool {
+/// Returns true if a cell may own a pair of entries with these marks.
+fn may_own(marks: u32) -> bool {
+    marks >> AXIS_BITS == 7
+}
+
+fn overlap(a: &DeviceBox, b: &DeviceBox) -> bool {
     (0..3).all(|k| a.low[k] <= b.high[k] && b.low[k] <= a.high[k])
 }
 
@@ -92,10 +98,9 @@ pub(super) fn check_large_item(s: &State, item: &LargeItem, checked: &mut Tested
     let entry = |place: u32| s.entries[(item.start + place) as usize];
     let segments = |from: u32, to: u32| from * LANES..(to * LANES).min(item.boxes);
     let (rows, columns) = (segments(item.row, item.row + 1), segments(item.column, item.end_column));
-    // If the cell is the lowest of no box on some axis, it owns none of these pairs and tests none. The same holds if no
-    // box has moved.
+    // If the cell is the lowest of no box on some axis, it owns none of these pairs and tests none.
     let marks = rows.clone().chain(columns.clone()).fold(0, |marks, place| marks | entry(place));
-    if !may_be_wanted(s, marks) {
+    if !may_own(marks) {
         return;
     }
     for i in rows.start..rows.end.min(item.residents) {
@@ -106,14 +111,11 @@ pub(super) fn check_large_item(s: &State, item: &LargeItem, checked: &mut Tested
 }
 
 pub(super) fn check_all(s: &mut State) {
-    let (mut checked, mut fresh) = (TestedPairs::default(), s.clone());
-    fresh.renew();
+    let mut checked = TestedPairs::default();
     for a in 0..s.params.boxes {
         for b in a + 1..s.params.boxes {
-            checked.test_boxes(&fresh, a, b);
+            checked.test_boxes(s, a, b);
         }
     }
-    let stored = std::mem::replace(&mut s.motions, fresh.motions);
     checked.leave(s);
-    s.motions = stored;
 }

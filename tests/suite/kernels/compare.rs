@@ -55,8 +55,7 @@ pub(super) fn encoded(s: &State, pairs: &[Pair]) -> Vec<u32> {
         return words;
     }
     let mark = (s.has(PACKED) && !pairs.is_empty()).then_some(PLAIN | pairs.len() as u32);
-    let mark_of = |pair: &Pair| if s.has(PACKED) { 0 } else { s.mark_of(pair) };
-    mark.into_iter().chain(pairs.iter().flat_map(|pair| [pair.a, pair.b | mark_of(pair)])).collect()
+    mark.into_iter().chain(pairs.iter().flat_map(|pair| [pair.a, pair.b])).collect()
 }
 
 /// Returns the pairs in `out`, sorted.
@@ -64,39 +63,15 @@ pub(super) fn decoded(s: &State) -> Result<Vec<Pair>, String> {
     let n = s.params.boxes;
     let counted = if s.has(BITS) { pair_count(n.into()).div_ceil(32) } else { wide(s.totals.words) };
     let words = s.out.get(..counted as usize).ok_or(format!("{counted} words in {}", s.out.len()))?;
-    let (mut pairs, mut ended) = (Vec::new(), Vec::new());
+    let mut pairs = Vec::new();
     let result = if s.has(BITS) {
         decode::bits(words, n, &mut pairs)
     } else if s.has(PACKED) {
-        // A pair behind a mark of plain pairs may have one of its own.
-        decode::records(&unmarked(s, words), &s.entries, n, &mut pairs)
+        decode::records(words, &s.entries, n, &mut pairs)
     } else {
-        decode::events(words, n, false, &mut pairs, &mut ended)
+        decode::plain(words, n, false, &mut pairs)
     };
-    let wrong = ended.iter().find(|pair| s.mark_of(pair) == 0).or(match s.has(PACKED | BITS) {
-        true => None,
-        false => pairs.iter().find(|pair| s.mark_of(pair) != 0),
-    });
-    if let Some(pair) = wrong {
-        return Err(format!("{pair:?} has the wrong mark"));
-    }
-    pairs.append(&mut ended);
     result.map(|()| sorted(&pairs)).map_err(|error| error.to_string())
-}
-
-/// Returns the records of a search for changes without the marks of plain pairs.
-fn unmarked(s: &State, words: &[u32]) -> Vec<u32> {
-    let (mut words, mut at) = (words.to_vec(), 0);
-    while s.finds_changes() && at < words.len() {
-        let first = words[at];
-        let end =
-            at + if first & PLAIN == 0 { 3 + first as usize } else { 1 + 2 * (first & !PLAIN) as usize };
-        if first & PLAIN != 0 {
-            words[at + 1..end].iter_mut().for_each(|word| *word &= !ENDED);
-        }
-        at = end;
-    }
-    words
 }
 
 pub(super) fn compare_checks(_: &State, found: &State, wanted: &State) -> Option<String> {

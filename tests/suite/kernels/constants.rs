@@ -5,7 +5,7 @@ use super::layout::SORTED;
 use super::*;
 
 fn module_of(kernel: &Kernel) -> naga::Module {
-    let parsed = naga::front::wgsl::parse_str(&kernel.source(true));
+    let parsed = naga::front::wgsl::parse_str(&kernel.source());
     parsed.unwrap_or_else(|error| panic!("{}: {error}", kernel.name))
 }
 
@@ -29,8 +29,8 @@ macro_rules! named {
 #[test]
 fn constants_are_those_of_the_kernels() {
     let everywhere = named! {
-        LANES, GROUPS_PER_ROW, MAX_LEVELS, NO_LEVEL, SPAN_BITS, BOX_BITS, AXIS_BITS, WAS_ABSENT,
-        FILTERED, PACKED, BITS, SORTED, COUNTED, ENDED
+        LANES, GROUPS_PER_ROW, MAX_LEVELS, NO_LEVEL, SPAN_BITS, BOX_BITS, AXIS_BITS,
+        FILTERED, PACKED, BITS, SORTED, COUNTED
     };
     let somewhere = named! {
         CELLS_PER_BLOCK, CELLS_PER_LANE, PLAIN, COUNTS_PER_BLOCK, SHORT_ROW, WINDOW, PIECE, PIECES,
@@ -46,7 +46,7 @@ fn constants_are_those_of_the_kernels() {
             assert_eq!(constant_of(&module, name).unwrap_or(value), value, "{}: {name}", kernel.name);
         }
         // A parsed module does not keep constants without a type.
-        assert!(kernel.source(true).contains(&most_span), "{}", kernel.name);
+        assert!(kernel.source().contains(&most_span), "{}", kernel.name);
     }
 }
 

@@ -15,7 +15,7 @@ pub(super) fn gpus() -> Option<&'static GpuFinder> {
 
 /// Runs a kernel on a state, and returns the state afterwards.
 pub(super) fn on_device(gpu: &GpuFinder, twin: &Twin, options: &GpuOptions, before: &State) -> State {
-    let text = poisoned(twin.kernel, before.finds_changes());
+    let text = poisoned(twin.kernel);
     run_text(gpu, twin.kernel, twin.groups, &text, options, before)
 }
 
@@ -24,13 +24,13 @@ pub(super) fn counting(kernel: &str, edits: &[[&str; 2]], before: &State) -> Sta
     let of_twins = TWINS.iter().map(|twin| (twin.kernel, twin.groups));
     let (kernel, groups) =
         of_twins.chain(SORT).find(|(one, _)| one.name == kernel).expect("a kernel of this name");
-    let text = edited(kernel, edits, before.finds_changes());
+    let text = edited(kernel, edits);
     run_text(gpu(), kernel, groups, &text, &GpuOptions::DEFAULT, before)
 }
 
 /// Returns the text of a kernel in which each edit replaces its first part by its second one.
-pub(super) fn edited(kernel: &Kernel, edits: &[[&str; 2]], changes: bool) -> String {
-    let mut text = poisoned(kernel, changes);
+pub(super) fn edited(kernel: &Kernel, edits: &[[&str; 2]]) -> String {
+    let mut text = poisoned(kernel);
     for [from, to] in edits {
         assert!(text.contains(from), "{} has no {from}", kernel.name);
         text = text.replace(from, to);
@@ -93,16 +93,13 @@ pub(super) fn fault(twin: &Twin, options: &GpuOptions, before: &State) -> Option
     Some(format!("{}: {fault}", twin.kernel.name))
 }
 
-/// Compares a kernel with its twin on all sets of at most `most_boxes` boxes, at rest and moving, with these codings, with filters
-/// and splits.
+/// Compares a kernel with its twin on all sets of at most `most_boxes` boxes, with these codings, with filters and splits.
 pub(super) fn check_agrees(kernel: &str, options: &GpuOptions, codings: &[u32], most_boxes: usize) {
-    let all = cases().into_iter().chain(moving_cases());
-    for case in all.filter(|case| case.boxes.len() <= most_boxes) {
+    for case in cases().into_iter().filter(|case| case.boxes.len() <= most_boxes) {
         let before = State::before(kernel, &case);
         let settings = [(0, 0), (FILTERED, before.params.boxes / 2), (FILTERED, 0)];
-        let settings = &settings[..if before.finds_changes() { 2 } else { 3 }];
         for &coding in codings {
-            for &(filtered, split) in settings {
+            for (filtered, split) in settings {
                 let state = before.clone().with(coding | filtered, split);
                 let fault = fault(twin(kernel), options, &state);
                 assert_eq!(fault, None, "{}, flags {}, split {split}", case.name, coding | filtered);

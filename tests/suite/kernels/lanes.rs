@@ -72,7 +72,7 @@ fn most_lanes_are_busy_in_cells_of_forty() {
 const LOADS: [[&str; 2]; 3] = [
     ["note_test(1u, 1u);", ""],
     ["staged_entries[lane] = entry;", "staged_entries[lane] = entry; atomicAdd(&tally[1], 1u);"],
-    ["return checked_box(", "atomicAdd(&tally[1], 1u); return checked_box("],
+    ["return ordered_box(", "atomicAdd(&tally[1], 1u); return ordered_box("],
 ];
 
 #[test]

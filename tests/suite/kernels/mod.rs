@@ -6,7 +6,6 @@
 
 mod capacity;
 mod cells;
-mod changes;
 mod checks;
 mod compare;
 mod constants;
@@ -22,7 +21,6 @@ mod twins;
 mod words;
 
 use bytemuck::{bytes_of_mut, cast_slice_mut};
-use changes::*;
 use checks::*;
 use compare::*;
 use device::*;
@@ -30,10 +28,9 @@ use indices::*;
 use pbig_core::{Aabb, Pair, ProxyFilter, oracle};
 use pbig_gpu::decode::{self, PLAIN};
 use pbig_gpu::layout::{
-    self, AXIS_BITS, BITS, BOX_BITS, BoxChange, CELLS_PER_BLOCK, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk,
-    Counters, DeviceBox, ENDED, FILTERED, FIRST_PIECE, FilterChange, GROUPS_PER_ROW, LANES, LargeItem, Level,
-    Located, MAX_SPAN, MOVED, Motion, NO_LEVEL, PACKED, PIECE, PIECES, Params, SHORT_ROW, SPAN_BITS, Slot,
-    SmallItem, Totals, WAS_ABSENT, WINDOW, halves, wide,
+    self, AXIS_BITS, BITS, BOX_BITS, CELLS_PER_BLOCK, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk, Counters,
+    DeviceBox, FILTERED, FIRST_PIECE, GROUPS_PER_ROW, LANES, LargeItem, Level, Located, MAX_SPAN, NO_LEVEL,
+    PACKED, PIECE, PIECES, Params, SHORT_ROW, SPAN_BITS, Slot, SmallItem, Totals, WINDOW, halves, wide,
 };
 use pbig_gpu::testing::plan_params;
 use pbig_gpu::{GpuFinder, GpuOptions};
@@ -110,7 +107,7 @@ fn some(states: &[State], what: &str, has: impl Fn(&State) -> bool) {
 #[test]
 fn every_kernel_of_the_map_agrees_with_its_twin() {
     for twin in TWINS.iter().take_while(|twin| twin.kernel.stage == Stage::Map) {
-        for case in cases().into_iter().chain(moving_cases()) {
+        for case in cases() {
             let before = State::before(twin.kernel.name, &case);
             assert_eq!(fault(twin, &GpuOptions::DEFAULT, &before), None, "{}", case.name);
         }
@@ -204,13 +201,8 @@ fn checks_agree_with_their_twins() {
 #[test]
 fn check_all_agrees_with_its_twin_on_few_boxes() {
     for n in [1, 2, 3, 8, 9, 23, 24, 33] {
-        let case = Case {
-            name: "few",
-            boxes: vec![Aabb::new([0.0; 3], [1.0; 3]); n],
-            before: Vec::new(),
-            small_cell: 32,
-            columns: 8,
-        };
+        let case =
+            Case { name: "few", boxes: vec![Aabb::new([0.0; 3], [1.0; 3]); n], small_cell: 32, columns: 8 };
         for flags in [0, PACKED, BITS] {
             let before = State::new(&case).with(flags, 0);
             let fault = fault(twin("check_all"), &GpuOptions::DEFAULT, &before);
@@ -268,13 +260,8 @@ fn planted_faults_are_noticed() {
         ("check_small", |s| s.totals.redundant[0] ^= 1),
         ("index_pairs", |s| s.out[4] ^= 1),
     ];
-    are_noticed(&faults, &pile());
-}
-
-/// Asserts that the comparison of each kernel finds the fault.
-fn are_noticed(faults: &[(&str, Plant)], case: &Case) {
     for (i, (kernel, plant)) in faults.iter().enumerate() {
-        let before = State::before(kernel, case);
+        let before = State::before(kernel, &pile());
         let wanted = after_twin(twin(kernel), &before);
         let mut found = wanted.clone();
         assert_eq!(twin(kernel).compare(&before, &found, &wanted), None, "{kernel}");
@@ -294,17 +281,15 @@ fn drop_a_pair(s: &mut State) {
     s.totals.words = halves(s.out.len() as u64);
 }
 
-/// A fault in the device's input must be noticed, too: without these bits no entry owns a pair, or none has moved.
+/// A fault in the device's input must be noticed, too: without this bit no entry owns a pair.
 #[test]
 fn entries_that_lost_a_bit_cost_pairs() {
     needs_gpu!();
-    for (case, lost) in [(pile(), 1 << AXIS_BITS), (moving(pile()), MOVED)] {
-        let mut before = State::before("check_small", &case);
-        let wanted = after_twin(twin("check_small"), &before);
-        before.entries.iter_mut().for_each(|entry| *entry &= !lost);
-        let before = with_capacity_for(&before, &wanted);
-        let found = on_device(gpu(), twin("check_small"), &GpuOptions::DEFAULT, &before);
-        let fault = compare_checks(&before, &found, &wanted).expect("pairs are missing");
-        assert!(fault.starts_with("missing"), "{fault}");
-    }
+    let mut before = State::before("check_small", &pile());
+    let wanted = after_twin(twin("check_small"), &before);
+    before.entries.iter_mut().for_each(|entry| *entry &= !(1 << AXIS_BITS));
+    let before = with_capacity_for(&before, &wanted);
+    let found = on_device(gpu(), twin("check_small"), &GpuOptions::DEFAULT, &before);
+    let fault = compare_checks(&before, &found, &wanted).expect("pairs are missing");
+    assert!(fault.starts_with("missing"), "{fault}");
 }

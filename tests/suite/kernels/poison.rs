@@ -42,8 +42,8 @@ fn compile(device: &wgpu::Device, kernel: &Kernel, text: &str, balanced: bool) -
 }
 
 /// Returns the text of a kernel that fills all workgroup memory before its first statement.
-pub(super) fn poisoned(kernel: &Kernel, changes: bool) -> String {
-    let text = kernel.source(changes);
+pub(super) fn poisoned(kernel: &Kernel) -> String {
+    let text = kernel.source();
     let module = naga::front::wgsl::parse_str(&text).expect("a valid text");
     let shared = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);
     let fills: Vec<String> = shared
@@ -83,13 +83,13 @@ fn fill(module: &Module, ty: naga::Handle<naga::Type>, place: &str, depth: usize
 
 #[test]
 fn all_workgroup_memory_is_poisoned() {
-    let text = poisoned(&shaders::CHECK_LARGE, true);
+    let text = poisoned(&shaders::CHECK_LARGE);
     let filled = |what: &str| assert!(text.contains(what), "{what} in {text}");
     filled("for (var i0 = lane; i0 < 5u; i0 += 256u) { atomicStore(&tally[i0], 0xdeadbeefu);");
-    filled("staged_boxes[i0].before.high[i1] = -559038737;");
+    filled("staged_boxes[i0].high[i1] = -559038737;");
     filled("placed.packed = 0xdeadbeefu;");
-    for kernel in all_kernels().filter(|kernel| kernel.source(false).contains("var<workgroup>")) {
-        naga::front::wgsl::parse_str(&poisoned(kernel, false)).expect("a valid text");
-        assert_ne!(poisoned(kernel, false), kernel.source(false), "{}", kernel.name);
+    for kernel in all_kernels().filter(|kernel| kernel.source().contains("var<workgroup>")) {
+        naga::front::wgsl::parse_str(&poisoned(kernel)).expect("a valid text");
+        assert_ne!(poisoned(kernel), kernel.source(), "{}", kernel.name);
     }
 }

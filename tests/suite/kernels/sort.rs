@@ -28,11 +28,10 @@ fn found_pairs(s: &State) -> u32 {
     (wide(s.totals.words) / 2) as u32
 }
 
-/// Returns the state after a check that has found these pairs: in a shuffled order, some of them marked.
+/// Returns the state after a check that has found these pairs: in a shuffled order.
 fn unsorted(boxes: u32, pairs: &[Pair]) -> State {
     let shuffled = (0..pairs.len()).map(|i| pairs[(i * 7919 + 13) % pairs.len()]);
-    let mark = |i: usize| if i.is_multiple_of(3) { ENDED } else { 0 };
-    let out: Vec<u32> = shuffled.enumerate().flat_map(|(i, pair)| [pair.a, pair.b | mark(i)]).collect();
+    let out: Vec<u32> = shuffled.flat_map(|pair| [pair.a, pair.b]).collect();
     let count = pairs.len() as u32;
     let mut state = State {
         params: Params { boxes, pair_capacity: count, ..Params::default() },
@@ -58,7 +57,7 @@ fn run_before(name: &str, state: State) -> State {
 fn run_edited(name: &str, mut state: State, edits: &[(&str, [&str; 2])]) -> State {
     for (kernel, groups) in SORT.iter().take_while(|(kernel, _)| kernel.name != name) {
         let own = edits.iter().filter(|(of, _)| *of == kernel.name).map(|(_, edit)| *edit);
-        let text = edited(kernel, &own.collect::<Vec<_>>(), false);
+        let text = edited(kernel, &own.collect::<Vec<_>>());
         state = run_text(gpu(), kernel, *groups, &text, &GpuOptions::DEFAULT, &state);
         if kernel.name == "count_pairs" {
             scan_rows(&mut state);
@@ -85,7 +84,7 @@ fn scan_rows(s: &mut State) {
 fn sort(boxes: u32, pairs: &[Pair], edits: &[(&str, [&str; 2])]) -> (Option<String>, u32) {
     let before = unsorted(boxes, pairs);
     let mut wanted = before.out.as_chunks::<2>().0.to_vec();
-    wanted.sort_unstable_by_key(|[a, b]| [*a, b & !ENDED]);
+    wanted.sort_unstable();
     let after = run_edited("none", before, edits);
     let pieces = by_piece(&after);
     let groups = [pieces.min(GROUPS_PER_ROW), pieces.div_ceil(GROUPS_PER_ROW), 1];
@@ -131,12 +130,6 @@ fn faults_planted_in_the_sort_are_noticed() {
     let pairs: Vec<_> = (1..900).map(|b| Pair::new(0, b)).chain((2..90).map(|b| Pair::new(1, b))).collect();
     let swapped = ["out[2u * at", "out[2u * (at ^ 1u)"];
     for (kernel, edit, words) in [
-        // Lost marks.
-        ("place_pairs", ["= out[2u * i + 1u];", "= out[2u * i + 1u] & 0x7fffffffu;"], "pairs: "),
-        ("rank_pairs", ["= second;", "= second_of(second);"], "pairs: "),
-        ("place_windows", ["= word;", "= second_of(word);"], "pairs: "),
-        ("rank_windows", ["word >> 31u", "0u"], "pairs: "),
-        // Swapped pairs.
         ("rank_pairs", swapped, "pairs: "),
         ("rank_windows", swapped, "pairs: "),
         ("arrange_rows", ["u32(sorted)", "u32(!sorted)"], "flag: "),
@@ -204,7 +197,7 @@ fn a_pair_of_a_long_row_is_read_a_few_times() {
     let note = "atomicAdd(&windows[arrayLength(&windows) - 1u], 1u);";
     for (kernel, read, most) in [
         ("place_windows", "return grouped[2u * i + 1u];", 4),
-        ("rank_windows", "let word = out[2u * i + 1u];", 1),
+        ("rank_windows", "let bit = out[2u * i + 1u]", 1),
     ] {
         let mut before = grounds(kernel, 10_000_000, 1, 50);
         before.windows.push(0);

@@ -11,11 +11,6 @@ pub(super) struct State {
     pub(super) params: Params,
     pub(super) chunk: Chunk,
     pub(super) boxes: Vec<Aabb>,
-    /// Boxes now and before, which replace `boxes` in a search for changes.
-    pub(super) motions: Vec<Motion>,
-    pub(super) box_changes: Vec<BoxChange>,
-    pub(super) filter_changes: Vec<FilterChange>,
-    pub(super) changed: Vec<u32>,
     pub(super) filters: Vec<ProxyFilter>,
     pub(super) located: Vec<Located>,
     pub(super) cells: Vec<Cell>,
@@ -38,8 +33,6 @@ pub(super) struct State {
 pub(super) struct Case {
     pub(super) name: &'static str,
     pub(super) boxes: Vec<Aabb>,
-    /// The boxes at the last update; empty for a search for overlaps.
-    pub(super) before: Vec<Aabb>,
     pub(super) small_cell: u32,
     pub(super) columns: u32,
 }
@@ -50,8 +43,7 @@ pub(super) fn set(name: &str, n: usize) -> Vec<Aabb> {
 
 pub(super) fn cases() -> Vec<Case> {
     let decades = corpus().into_iter().find(|case| case.name == "sizes over twelve decades");
-    let case =
-        |name, boxes, small_cell, columns| Case { name, boxes, before: Vec::new(), small_cell, columns };
+    let case = |name, boxes, small_cell, columns| Case { name, boxes, small_cell, columns };
     vec![
         case("mixed", set("mixed", 3000), 32, 8),
         pile(),
@@ -64,14 +56,14 @@ pub(super) fn cases() -> Vec<Case> {
 
 /// Returns a set with cells of about four boxes, half of which count as large.
 pub(super) fn pile() -> Case {
-    Case { name: "pile", boxes: set("pile", 6000), before: Vec::new(), small_cell: 4, columns: 8 }
+    Case { name: "pile", boxes: set("pile", 6000), small_cell: 4, columns: 8 }
 }
 
 /// Returns many identical boxes across the borders of cells: some large cells own none of their pairs.
 pub(super) fn crowd() -> Case {
     let mut boxes = set("pile", 1000);
     boxes.extend(vec![boxes[500]; 700]);
-    Case { name: "crowd in a pile", boxes, before: Vec::new(), small_cell: 32, columns: 2 }
+    Case { name: "crowd in a pile", boxes, small_cell: 32, columns: 2 }
 }
 
 /// Returns filters that allow some pairs, and forbid others for each possible reason.
@@ -91,7 +83,7 @@ impl State {
     pub(super) fn new(case: &Case) -> Self {
         let n = case.boxes.len();
         let (small_cell, columns) = (case.small_cell, case.columns);
-        let plan = plan_params(&all_bounds(case), &GpuOptions::DEFAULT, 1 << 20);
+        let plan = plan_params(&case.boxes, &GpuOptions::DEFAULT, 1 << 20);
         validate(&plan);
         let (flags, most_tests) = (COUNTED, u32::MAX);
         let params = Params { boxes: n as u32, small_cell, columns, flags, most_tests, ..plan };
@@ -118,7 +110,6 @@ impl State {
             },
             ..Self::default()
         };
-        state.add_changes(case);
         state.set_exact_capacities();
         state
     }
@@ -188,11 +179,7 @@ impl State {
         match buffer {
             Buffer::Params => bytes_of_mut(&mut self.params),
             Buffer::Chunk => bytes_of_mut(&mut self.chunk),
-            Buffer::Boxes if self.finds_changes() => cast_slice_mut(&mut self.motions),
             Buffer::Boxes => cast_slice_mut(&mut self.boxes),
-            Buffer::BoxChanges => cast_slice_mut(&mut self.box_changes),
-            Buffer::FilterChanges => cast_slice_mut(&mut self.filter_changes),
-            Buffer::Changed => cast_slice_mut(&mut self.changed),
             Buffer::Filters => cast_slice_mut(&mut self.filters),
             Buffer::Located => cast_slice_mut(&mut self.located),
             Buffer::Cells => cast_slice_mut(&mut self.cells),

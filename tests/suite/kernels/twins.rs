@@ -28,8 +28,7 @@ impl Twin {
 }
 
 /// The twins, in the order in which the kernels run. The kernels of the sort have none.
-pub(super) static TWINS: [Twin; 12] = [
-    Twin { kernel: &shaders::APPLY_CHANGES, run: apply_changes, groups: by_change, compare: None },
+pub(super) static TWINS: [Twin; 11] = [
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: None },
     Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: None },
     Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: None },
@@ -95,10 +94,8 @@ pub(super) fn by_pair(s: &State) -> u32 {
 }
 
 pub(super) fn locate(s: &mut State) {
-    let mut fresh = s.clone();
-    fresh.renew();
     for id in 0..s.boxes.len() {
-        let one = fresh.bounds(id);
+        let one = DeviceBox::new(&s.boxes[id]);
         if one.low[0] > one.high[0] {
             s.located[id].shape = NO_LEVEL;
             continue;
@@ -107,14 +104,12 @@ pub(super) fn locate(s: &mut State) {
         let cells = |corner: [i32; 3]| corner.map(|key| finest_cell(&s.params, key));
         let (low, high) = (cells(one.low), cells(one.high));
         let level = level_of(&s.params, low, high);
-        let mut at = located_at(&s.params, low, high, level);
-        at.shape |= if fresh.has_moved(id) { MOVED } else { 0 };
+        let at = located_at(&s.params, low, high, level);
         s.located[id] = at;
         for (cell, _) in cells_of(&s.params, &at, level) {
             s.cells[cell].residents += 1;
         }
     }
-    s.motions = fresh.motions;
 }
 
 /// Returns the float of an ordered integer.
@@ -146,6 +141,11 @@ fn located_at(params: &Params, low: [i32; 3], high: [i32; 3], level: u32) -> Loc
     let steps = [0, 1, 2].map(|k| ((high[k] >> shift) - first[k]).min(3) as u32);
     let spans = steps[0] | steps[1] << 2 | steps[2] << 4;
     Located { low: first, shape: level | spans << SPAN_BITS }
+}
+
+/// Returns the level. For an invalid box it is larger than all levels.
+fn own_level(at: &Located) -> u32 {
+    at.shape & ((1 << SPAN_BITS) - 1)
 }
 
 /// Returns the cells that a box touches at a level, each with the axis bits of its entry.
@@ -290,7 +290,7 @@ pub(super) fn scatter(s: &mut State) {
         let own = own_level(&at);
         for level in own..s.params.levels {
             for (cell, axes) in cells_of(&s.params, &at, level) {
-                place(s, cell, id as u32 | (at.shape & MOVED) | axes, level == own);
+                place(s, cell, id as u32 | axes, level == own);
             }
         }
     }

@@ -3,7 +3,6 @@
 use super::AXIS_BITS;
 use pbig_core::Pair;
 use pbig_gpu::decode::{self, DecodeError, PLAIN};
-use pbig_gpu::layout::ENDED;
 
 fn plain(words: &[u32], boxes: u32, is_sorted: bool) -> Result<Vec<Pair>, DecodeError> {
     let mut pairs = vec![pair(0, 1)];
@@ -34,9 +33,6 @@ fn the_example_of_the_format() {
     assert_eq!(records(&words, &entries, 10), Ok(wanted));
     assert_eq!(plain(&[1, 2, 0, 9], 10, false), Ok(vec![pair(1, 2), pair(0, 9)]));
     assert_eq!(plain(&[0, 9, 1, 2], 10, true), Ok(vec![pair(0, 9), pair(1, 2)]));
-    let (mut added, mut ended) = (Vec::new(), Vec::new());
-    assert_eq!(decode::events(&[1, 2 | ENDED, 0, 9], 10, false, &mut added, &mut ended), Ok(()));
-    assert_eq!((added, ended), (vec![pair(0, 9)], vec![pair(1, 2)]));
     // Pairs 0 (0, 1) and 4 (1, 3) of four boxes.
     assert_eq!(bits(&[0b01_0001], 4), Ok(vec![pair(0, 1), pair(1, 3)]));
 }
@@ -58,12 +54,6 @@ fn broken_words_are_errors() {
     assert_eq!(what(plain(&[1, 3], 3, false)), "not a < b < boxes");
     assert_eq!(what(plain(&[0, 2, 0, 1], 3, true)), "pairs out of order");
     assert_eq!(what(plain(&[0, 1, 0, 1], 3, true)), "pairs out of order");
-    let events =
-        |words: &[u32]| decode::events(words, 3, true, &mut Vec::new(), &mut Vec::new()).unwrap_err().what;
-    assert_eq!(events(&[0, 2, 0, 1 | ENDED]), "pairs out of order");
-    assert_eq!(events(&[0, 1 | ENDED, 0, 1]), "pairs out of order");
-    assert_eq!(events(&[1 | ENDED, 2]), "not a < b < boxes");
-    assert_eq!(events(&[1, 3 | ENDED]), "not a < b < boxes");
     assert_eq!(what(bits(&[0b1000], 3)), "a bit beyond the last pair");
     assert_eq!(what(bits(&[], 3)), "not one bit a pair");
 }

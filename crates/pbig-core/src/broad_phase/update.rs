@@ -61,7 +61,7 @@ impl BroadPhase {
 
     fn find_events(&mut self) -> Result<(), Error> {
         let changed = self.world.changed.len();
-        if self.device.is_wanted(&self.config, Work::Update(changed as u64), &mut self.report) {
+        if self.device.is_wanted(&self.config, Work::Update, &mut self.report) {
             let outcome = self.run(|parts, task, tree| parts.search.run(task, tree, Some(parts.device)));
             if self.take(outcome)? {
                 return Ok(());

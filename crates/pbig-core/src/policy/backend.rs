@@ -7,17 +7,12 @@ use std::fmt;
 /// of 16 threads, and 0.3 to 0.4 of that of four. No smaller device was measured.
 pub(crate) const AUTO_DEVICE_FROM_BOXES: u64 = 100_000;
 
-/// Minimum number of changed boxes for [`Backend::Auto`] to update on a hardware device: none does, as no device was measured. (It would
-/// search all boxes, while the CPU looks at the changed ones alone if they are few.)
-pub(crate) const AUTO_DEVICE_FROM_CHANGES: u64 = u64::MAX;
-
 /// The work of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Work {
     /// A search of this number of boxes.
     Search(u64),
-    /// An update of this number of changed boxes.
-    Update(u64),
+    Update,
 }
 
 /// The backend that does the work of a call.
@@ -60,8 +55,10 @@ impl fmt::Display for NoDevice {
 /// | `Device` | any | any | device; without one the caller falls back to the CPU |
 /// | `Cpu`, `Brute` | any | any | CPU |
 /// | `Auto` | hardware | a search of at least [`AUTO_DEVICE_FROM_BOXES`] | device |
-/// | `Auto` | hardware | an update of at least [`AUTO_DEVICE_FROM_CHANGES`] | device |
 /// | `Auto` | any | any | CPU |
+///
+/// In an update a device searches all boxes. The CPU looks at the changed ones alone if they are few, with a structure of the last
+/// update, which a device does not leave.
 pub(crate) fn choose_backend(backend: Backend, is_software: Option<bool>, work: Work) -> Choice {
     Choice::Cpu(match (backend, is_software) {
         (Backend::Device, _) => return Choice::Device,
@@ -69,9 +66,9 @@ pub(crate) fn choose_backend(backend: Backend, is_software: Option<bool>, work: 
         (Backend::Auto, None) => Some(NoDevice::NotGiven),
         (Backend::Auto, Some(true)) => Some(NoDevice::Software),
         (Backend::Auto, _) => match work {
-            Work::Update(changes) if changes < AUTO_DEVICE_FROM_CHANGES => Some(NoDevice::Update),
+            Work::Update => Some(NoDevice::Update),
             Work::Search(boxes) if boxes < AUTO_DEVICE_FROM_BOXES => Some(NoDevice::FewBoxes),
-            Work::Search(_) | Work::Update(_) => return Choice::Device,
+            Work::Search(_) => return Choice::Device,
         },
     })
 }
@@ -87,10 +84,10 @@ mod tests {
         assert_eq!(auto(Some(true), u64::MAX), Choice::Cpu(Some(NoDevice::Software)));
         assert_eq!(auto(Some(false), 99_999), Choice::Cpu(Some(NoDevice::FewBoxes)));
         assert_eq!(auto(Some(false), 100_000), Choice::Device);
-        let update = choose_backend(Backend::Auto, Some(false), Work::Update(1 << 28));
+        let update = choose_backend(Backend::Auto, Some(false), Work::Update);
         assert_eq!(update, Choice::Cpu(Some(NoDevice::Update)));
         for device in [None, Some(true), Some(false)] {
-            for work in [Work::Search(2), Work::Update(2)] {
+            for work in [Work::Search(2), Work::Update] {
                 assert_eq!(choose_backend(Backend::Device, device, work), Choice::Device);
             }
             for backend in [Backend::Cpu, Backend::Brute] {

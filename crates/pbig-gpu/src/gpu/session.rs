@@ -119,7 +119,7 @@ impl Session {
         // A failed upload leaves its bytes.
         self.storage.bytes_sent = 0;
         self.storage.upload(&[
-            // All of them: to find those that have changed, the host would have to read them and a copy of the last call's, which takes longer.
+            // All of them: to find those that have changed, the host would have to read a copy of the last call's, too, which takes longer.
             Upload::new(Buffer::Boxes, job.boxes),
             Upload::new(Buffer::Filters, job.filters.unwrap_or(&[])),
         ])?;

@@ -9,9 +9,8 @@ pub fn decode_words(data: &[u8]) {
     let words: Vec<u32> = rest.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
     let (entries, output) = words.split_at(words.len().min(usize::from(*entries)));
     let boxes = if format & 4 == 0 { u32::from(*boxes) } else { u32::MAX - u32::from(*boxes) };
-    let (mut pairs, mut ended): (Vec<Pair>, _) = Default::default();
+    let mut pairs: Vec<Pair> = Vec::new();
     let found = match format & 3 {
-        0 if format & 8 != 0 => decode::events(output, boxes, format & 16 != 0, &mut pairs, &mut ended),
         0 => decode::plain(output, boxes, format & 16 != 0, &mut pairs),
         1 => decode::records(output, entries, boxes, &mut pairs),
         2 => decode::bits(output, boxes, &mut pairs),
@@ -20,7 +19,6 @@ pub fn decode_words(data: &[u8]) {
     if found.is_err() {
         return;
     }
-    pairs.append(&mut ended);
     assert!(pairs.iter().all(|pair| pair.a < pair.b && pair.b < boxes), "no pairs of {boxes} boxes");
     // A row takes a byte for each partner, a bit is one pair.
     assert!(pairs.len() <= 32 * output.len(), "{} pairs of {} words", pairs.len(), output.len());

@@ -8,7 +8,6 @@ use pbig_harness::corpus::difference;
 #[derive(Debug)]
 pub(super) struct Mode {
     pub(super) name: &'static str,
-    pub(super) finds_changes: bool,
     /// Maximum number of boxes that the mode can take, or can take in seconds.
     pub(super) most_boxes: usize,
     coding: Coding,
@@ -23,7 +22,6 @@ pub(super) struct Mode {
 
 const PLAIN: Mode = Mode {
     name: "plain",
-    finds_changes: false,
     most_boxes: usize::MAX,
     coding: Coding::Plain,
     is_sorted: false,
@@ -41,7 +39,6 @@ pub(super) const MODES: &[Mode] = &[
     Mode { name: "all pairs, sorted", is_sorted: true, has_grid: false, most_boxes: 1024, ..PLAIN },
     Mode { name: "chunks", chunk: [20, 3], most_boxes: 300, ..PLAIN },
     Mode { name: "sorted chunks", is_sorted: true, chunk: [20, 3], most_boxes: 300, ..PLAIN },
-    Mode { name: "changes", finds_changes: true, ..PLAIN },
 ];
 
 impl Mode {

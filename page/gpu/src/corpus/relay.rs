@@ -1,8 +1,8 @@
 //! The device of a finder or a world in a page, which may not wait in a call: the answer is there before the core asks.
 
 use pbig_core::{
-    Aabb, Backend, BroadPhase, ChangeRequest, ChangedBox, Config, DeviceFailure, DeviceFound, Finder, Limits,
-    Order, Pair, PairDevice, ProxyFilter, Report, SearchRequest,
+    Aabb, Backend, BroadPhase, Config, DeviceFailure, DeviceFound, Finder, Limits, Order, Pair, PairDevice,
+    ProxyFilter, Report, SearchRequest,
 };
 use pbig_gpu::GpuFinder;
 use pbig_harness::corpus::difference;
@@ -23,31 +23,27 @@ pub(super) struct Relay(Arc<Mutex<State>>);
 struct State {
     answer: Option<Result<DeviceFound, DeviceFailure>>,
     /// The last question without an answer.
-    asked: Option<Update>,
-    /// The core has asked to forget the last update since then.
-    must_forget: bool,
+    asked: Option<Question>,
 }
 
-/// A copy of a [`ChangeRequest`].
+/// A copy of a [`SearchRequest`].
 #[derive(Debug)]
-struct Update {
+struct Question {
     boxes: Vec<Aabb>,
-    filters: Vec<ProxyFilter>,
-    changed: Vec<ChangedBox>,
-    kept: u64,
+    filters: Option<Vec<ProxyFilter>>,
+    is_sorted: bool,
     max_pairs: u64,
 }
 
-impl Update {
-    fn of(request: &ChangeRequest<'_>) -> Self {
-        let &ChangeRequest { boxes, filters, changed, kept, max_pairs } = request;
-        let (boxes, filters, changed) = (boxes.to_vec(), filters.to_vec(), changed.to_vec());
-        Self { boxes, filters, changed, kept, max_pairs }
+impl Question {
+    fn of(request: &SearchRequest<'_>) -> Self {
+        let &SearchRequest { boxes, filters, is_sorted, max_pairs } = request;
+        Self { boxes: boxes.to_vec(), filters: filters.map(<[_]>::to_vec), is_sorted, max_pairs }
     }
 
-    fn request(&self) -> ChangeRequest<'_> {
-        let Self { boxes, filters, changed, kept, max_pairs } = self;
-        ChangeRequest { boxes, filters, changed, kept: *kept, max_pairs: *max_pairs }
+    fn request(&self) -> SearchRequest<'_> {
+        let &Self { ref boxes, ref filters, is_sorted, max_pairs } = self;
+        SearchRequest { boxes, filters: filters.as_deref(), is_sorted, max_pairs }
     }
 }
 
@@ -61,16 +57,10 @@ impl Relay {
     pub(super) async fn ask(&self, world: &BroadPhase, gpu: &mut GpuFinder) {
         // The update of the copy is the CPU's, and may exceed a limit.
         let _ = world.clone().update();
-        let (asked, must_forget) = {
-            let mut state = self.state();
-            (state.asked.take(), std::mem::take(&mut state.must_forget))
-        };
-        if must_forget {
-            gpu.forget();
-        }
+        let asked = self.state().asked.take();
         if let Some(asked) = asked {
             let mut found = DeviceFound::default();
-            let done = gpu.find_changed_async(&asked.request(), &mut found).await;
+            let done = gpu.find_all_async(&asked.request(), &mut found).await;
             self.state().answer = Some(done.map(|()| found));
         }
     }
@@ -78,37 +68,21 @@ impl Relay {
     fn state(&self) -> MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
-
-    /// Returns the answer, if there is one.
-    fn take(&self, found: &mut DeviceFound) -> Result<(), DeviceFailure> {
-        let none = || Err(DeviceFailure::Declined("there is no answer yet".into()));
-        *found = self.state().answer.take().unwrap_or_else(none)?;
-        Ok(())
-    }
 }
 
 impl PairDevice for Relay {
-    fn find_all(&mut self, _: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), DeviceFailure> {
-        self.take(found)
-    }
-
-    fn find_changed(
+    fn find_all(
         &mut self,
-        request: &ChangeRequest<'_>,
+        request: &SearchRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
         let mut state = self.state();
-        if state.answer.is_none() {
-            state.asked = Some(Update::of(request));
-        }
-        drop(state);
-        self.take(found)
-    }
-
-    /// The device has forgotten already if its answer is there.
-    fn forget(&mut self) {
-        let mut state = self.state();
-        state.must_forget = state.answer.is_none();
+        let Some(answer) = state.answer.take() else {
+            state.asked = Some(Question::of(request));
+            return Err(DeviceFailure::Declined("there is no answer yet".into()));
+        };
+        *found = answer?;
+        Ok(())
     }
 
     fn name(&self) -> Option<&str> {
