@@ -121,17 +121,19 @@ fn cut(len: usize) -> usize {
 /// axes, and rounding would choose one of them again and again.
 const TIE: f64 = 0.01;
 
-/// Minimum extent that counts, as a share of the longest one.
+/// Minimum own extent that counts, as a share of the middle one of three.
 const LEAST_EXTENT: f64 = 1.0 / 16.0;
 
 /// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their own extents
 /// and the mean extents of all boxes in the same place. (If only their own extents counted, thin tiles would be cut into slabs as
-/// wide as the world. Slabs of tiles that stand in two directions all meet each other, and a ray across them meets all.)
+/// wide as the world. Slabs of tiles that stand in two directions all meet each other, and a ray across them meets all. Flat boxes at
+/// many heights would be cut so, too: hence the least extent.)
 fn best_axis(part: &Measure, others: &[Sampled]) -> usize {
     let Measure { spread, extents, .. } = part;
-    let extents: [f64; 3] = std::array::from_fn(|k| extents[k] + part.mean_within(others, k));
-    let least = LEAST_EXTENT * extents.iter().copied().fold(0.0, f64::max);
-    let extents = extents.map(|extent| extent.max(least));
+    let mut sorted = *extents;
+    sorted.sort_unstable_by(f64::total_cmp);
+    let least = LEAST_EXTENT * sorted[1];
+    let extents: [f64; 3] = std::array::from_fn(|k| extents[k].max(least) + part.mean_within(others, k));
     let compare = |a: usize, b: usize| {
         let (one, other) = (spread[a] * extents[b], spread[b] * extents[a]);
         let is_tie = (one - other).abs() <= TIE * one.max(other);
