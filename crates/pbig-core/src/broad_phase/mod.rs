@@ -48,7 +48,7 @@ pub struct Events {
 ///
 /// Each box is stored fat, grown by [`Config::margin`]. While a later box stays inside its fat box, at most two margins from each
 /// of its sides, nothing has changed and nothing is done. Ids should be dense: each id up to the largest takes 61 bytes, used or
-/// not. The grid and the pairs come on top.
+/// not. The tree, grids and pairs come on top.
 ///
 /// An update in which few boxes have changed looks up only these, in a tree of all boxes. An update in which many have changed
 /// searches all boxes, and compares the pairs with those of the last update. After a peak it takes time for the boxes that are left.
