@@ -46,8 +46,8 @@ fn note<E: EventPattern<Event: EntityEvent>>(
     boxes.lost.extend(bodies.iter_many(joined.chain([entity])).flatten().flatten());
 }
 
-/// Sets the boxes of the proxies that avian lists as moved, if it has changed the list since the update: it clears the list next.
-/// So AABBs that a user updates within a step are seen, unless the user does so after this.
+/// Sets the boxes of the proxies that avian lists as moved, if avian has changed the list since the update, because it clears the list
+/// next. An AABB that a user's system updates before this is seen in the same step; one that is updated later is not.
 pub(crate) fn follow_late(
     trees: Res<ColliderTrees>,
     moved: Res<MovedProxies>,

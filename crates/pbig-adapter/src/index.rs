@@ -79,7 +79,7 @@ pub(crate) struct SceneIndex {
 #[derive(Debug)]
 struct Fresh {
     index: BoxIndex,
-    /// The same boxes in a better order, once queries have paid for it.
+    /// An index of these boxes in a better order, made once queries have looked at as many nodes as a sort costs.
     sorted: OnceLock<BoxIndex>,
     /// Held by the query that sorts. The others go on with the index as it is.
     sorting: Mutex<()>,

@@ -24,7 +24,7 @@ fn met(core: &BroadPhase, index: &SceneIndex, aabb: &Aabb) -> Vec<u32> {
     met
 }
 
-/// Whoever refreshes must not wait for a thread of the pool, because all of them may wait for the refresh.
+/// A thread that refreshes the index must not wait for one of the pool, because all of these may wait for the refresh.
 #[test]
 fn a_thread_refreshes_the_index_although_all_of_the_pool_wait_for_it() {
     let (sender, receiver) = mpsc::channel();

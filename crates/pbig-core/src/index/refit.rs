@@ -36,7 +36,8 @@ impl BoxIndex {
         }
     }
 
-    /// As [`BoxIndex::refresh`], on the caller's thread alone: for a caller whose lock other tasks of rayon's threads wait for.
+    /// As [`BoxIndex::refresh`], on the caller's thread alone. A caller that holds a lock needs this: rayon could give its thread another
+    /// task, which waits for the lock.
     #[doc(hidden)]
     pub fn refresh_alone(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
         alone(|| self.refresh(boxes, changed));
