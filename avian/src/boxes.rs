@@ -100,7 +100,7 @@ impl ColliderBoxes {
     }
 
     /// Sets the box of a collider, unless its key is out of date.
-    pub(crate) fn set(&mut self, trees: &ColliderTrees, slot: Slot) -> Result<(), Error> {
+    fn set(&mut self, trees: &ColliderTrees, slot: Slot) -> Result<(), Error> {
         let aabb = trees.tree_for_type(slot.key.tree_type()).get_proxy_aabb(slot.key.id());
         let Some((proxy, aabb)) = slot.proxy(trees).zip(aabb) else { return Ok(()) };
         let id = self.store(slot);

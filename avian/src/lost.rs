@@ -6,7 +6,7 @@
 //! and pbig reports their pairs again. The observers below watch all components that avian's trees, narrow phase and joint graph
 //! watch. A collider that begins anew for nothing does no harm.
 
-use crate::boxes::{ColliderBoxes, Slot};
+use crate::boxes::ColliderBoxes;
 use avian::collider_tree::{ColliderTrees, MovedProxies};
 use avian::dynamics::joints::joint_graph::JointGraph;
 use avian::prelude::*;
@@ -46,8 +46,8 @@ fn note<E: EventPattern<Event: EntityEvent>>(
     boxes.lost.extend(bodies.iter_many(joined.chain([entity])).flatten().flatten());
 }
 
-/// Sets the boxes of the proxies that avian lists as moved, if it has changed the list since the update: it clears the list next.
-/// So AABBs that a user updates within a step are seen, unless the user does so after this.
+/// Notes the colliders that avian lists as moved, if avian has changed the list since the update, because it clears the list next. They
+/// begin anew even if their AABBs come back before the next update: the narrow phase may have removed their contacts in between.
 pub(crate) fn follow_late(
     trees: Res<ColliderTrees>,
     moved: Res<MovedProxies>,
@@ -56,10 +56,6 @@ pub(crate) fn follow_late(
     if moved.last_changed() == boxes.moved_at {
         return;
     }
-    for &key in moved.proxies() {
-        let Some(collider) = trees.get_proxy(key).map(|proxy| proxy.collider) else { continue };
-        if boxes.set(&trees, Slot { key, collider, moved: None }).is_err() {
-            boxes.lost.insert(collider);
-        }
-    }
+    let colliders = moved.proxies().iter().filter_map(|key| trees.get_proxy(*key));
+    boxes.lost.extend(colliders.map(|proxy| proxy.collider));
 }

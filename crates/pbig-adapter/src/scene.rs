@@ -13,7 +13,7 @@ pub enum Proxy<A> {
     Disabled,
     /// Its AABB is not finite: it keeps its last box, and has this filter.
     Unplaced(ProxyFilter),
-    /// It takes part.
+    /// Takes part in collisions.
     Enabled {
         /// Without margin.
         aabb: A,

@@ -1,4 +1,4 @@
-//! What docs/RAPIER_VERSIONS.md names as different from rapier's own broad phase, each beside it.
+//! Differences that docs/RAPIER_VERSIONS.md names, each shown beside rapier's own broad phase.
 
 use glam::Vec3;
 use pbig_harness_036::dimension::cuboid;

@@ -20,7 +20,7 @@ pub(super) struct Tree {
 #[derive(Debug, Default)]
 struct Fresh {
     index: BoxIndex,
-    /// The same boxes in a better order, once queries have paid for it.
+    /// A tree of these boxes in a better order, made once queries have looked at as many nodes as a sort costs.
     sorted: OnceLock<BoxIndex>,
     /// Held by the query that sorts. The others go on with the tree as it is.
     sorting: Mutex<()>,
