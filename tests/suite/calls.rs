@@ -98,7 +98,8 @@ fn repeated_calls_allocate_for_rare_plans_only() {
     // Half of them have nothing to do.
     let asking = |least: usize| late.iter().filter(|bytes| **bytes > least).count();
     assert!(20 * asking(0) < late.len(), "{} of {} calls", asking(0), late.len());
-    assert!(100 * asking(4096) <= late.len(), "{} calls for more than a plan: {late:?}", asking(4096));
+    // Rows of pairs that have moved leave gaps, and move together into a new list once half of it is gaps.
+    assert!(40 * asking(4096) <= late.len(), "{} calls for more than a plan: {late:?}", asking(4096));
     let added = weighed.inner.stats().totals.added - before;
     assert!(added > 1000, "{added} pairs");
 }

@@ -75,7 +75,7 @@ fn memory_comes_back_without_changes_and_without_boxes() {
             held() - start
         };
         let few = (0..400).map(left).last().unwrap_or(0);
-        assert!(few < 96 * i64::from(BOXES), "{few} bytes for ids");
+        assert!(few < 100 * i64::from(BOXES), "{few} bytes for ids");
         broad_phase.shrink_to_fit();
         let shrunk = held() - start;
         assert!(shrunk < 50_000, "{shrunk} bytes for 100 boxes");

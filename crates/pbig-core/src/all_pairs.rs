@@ -1,10 +1,10 @@
 //! All pairs of a list of boxes, or those of two sets: by grids, by a tree where a grid would test too many, or by testing every
 //! pair of a few.
 
+use crate::device_slot::DeviceSlot;
 use crate::grid::{
     ById, Grid, GridPlan, Hits, Receiver, Rule, Sorted, TwoGrids, brute_force, brute_force_across,
 };
-use crate::device_slot::DeviceSlot;
 use crate::index::BoxIndex;
 use crate::memory::{Scratch, ShrinkingVec};
 use crate::outcome::{End, Outcome};
@@ -13,9 +13,7 @@ use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
 use crate::report::{Checks, Clock, stage};
 use crate::streamed;
-use crate::{
-    Aabb, Algorithm, Backend, Boxes, Config, Engine, Keys, Pair, Plan, ProxyFilter, SearchRequest,
-};
+use crate::{Aabb, Algorithm, Backend, Boxes, Config, Engine, Keys, Pair, Plan, ProxyFilter, SearchRequest};
 use std::sync::atomic::AtomicU64;
 
 /// A search: boxes, filters and settings.

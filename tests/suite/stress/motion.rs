@@ -38,7 +38,7 @@ fn free_fall_for_a_million_steps_at_the_same_cost_and_memory() {
         println!("{:?}: {steps} steps to {depth:e}, at most {cost:?} checks", config.engine);
         assert!(depth < -1e9, "fell to {depth}");
         assert!(cost.late <= cost.early * 5 / 4, "{cost:?}: deep down it costs more");
-        assert!(cost.early > 0 && cost.late > 0, "{cost:?}: brute force took over");
+        assert!(cost.early > 0 && cost.late > 0, "{cost:?}");
         // Brute force tests each of 200 boxes against all, wherever they are.
         let most = if config.engine.is_none() { 200 * 200 } else { 30 * 200 };
         assert!(cost.most <= most, "{cost:?} in an update of 200 boxes");
@@ -80,7 +80,7 @@ fn fall(config: Config, steps: usize, acceleration: f32) -> (Cost, f32) {
             world.update_unchecked();
         }
         let report = world.broad_phase.report();
-        assert_ne!(report.plan.algorithm, Algorithm::Brute, "step {step}");
+        assert_eq!(report.plan.algorithm == Algorithm::Brute, config.engine.is_none(), "step {step}");
         cost.note(report.checks.made, step, steps);
         let held = memory::held();
         if step < steps / 4 {

@@ -14,8 +14,8 @@ use crate::policy;
 use crate::report::{Clock, stage};
 use crate::{Algorithm, Checks, Engine, Pair, Plan};
 
-/// Boxes that a thread looks up before it tells the others its work.
-const CHARGED_TOGETHER: usize = 64;
+/// Work of a thread that it does not tell the others yet.
+const UNTOLD: u64 = 1024;
 
 /// The buffers of the look-ups.
 #[derive(Clone, Debug, Default)]
@@ -122,23 +122,23 @@ impl Thread {
         ids: &[u64],
         (budget, most_added): (&Budget, u64),
     ) {
-        for words in ids.chunks(CHARGED_TOGETHER) {
-            let before = thread.nodes + thread.met;
-            for &word in words {
-                let id = word as u32;
-                thread.now.clear();
-                thread.nodes += index.overlaps(simd, &world.boxes[id as usize], |other| thread.now.push(other));
-                thread.met += thread.now.len() as u64;
-                thread.compare(simd, world, kept, id);
-                if thread.added.len() as u64 > most_added {
+        let mut told = thread.nodes + thread.met;
+        for &word in ids {
+            let id = word as u32;
+            thread.now.clear();
+            thread.nodes += index.overlaps(simd, &world.boxes[id as usize], |other| thread.now.push(other));
+            thread.met += thread.now.len() as u64;
+            thread.compare(simd, world, kept, id);
+            let work = thread.nodes + thread.met;
+            if work > told + UNTOLD {
+                budget.charge(work - told);
+                told = work;
+                if budget.is_over() || thread.added.len() as u64 > most_added {
                     return;
                 }
             }
-            budget.charge(thread.nodes + thread.met - before);
-            if budget.is_over() {
-                return;
-            }
         }
+        budget.charge(thread.nodes + thread.met - told);
     }
 
     /// Compares what a box overlaps with its kept pairs. Most boxes keep theirs.

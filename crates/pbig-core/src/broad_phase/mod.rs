@@ -23,7 +23,7 @@ use crate::memory::Scratch;
 use crate::pairs::{Comparison, Kept};
 use crate::policy;
 use crate::report::Report;
-use crate::{Aabb, Backend, Config, Error, Limits, Pair, PairDevice, ProxyFilter};
+use crate::{Aabb, Algorithm, Backend, Config, Error, Limits, Pair, PairDevice, ProxyFilter};
 use look_up::LookUp;
 use search::Search;
 use world::World;
@@ -47,7 +47,7 @@ pub struct Events {
 /// Boxes by id, and the pairs between them, kept from update to update.
 ///
 /// Each box is stored fat, grown by [`Config::margin`]. While a later box stays inside its fat box, at most two margins from each
-/// of its sides, nothing has changed and nothing is done. Ids should be dense: each id up to the largest takes 61 bytes, used or
+/// of its sides, nothing has changed and nothing is done. Ids should be dense: each id up to the largest takes 65 bytes, used or
 /// not. The tree, grids and pairs come on top.
 ///
 /// An update in which few boxes have changed looks up only these, in a tree of all boxes. An update in which many have changed
@@ -72,6 +72,8 @@ pub struct BroadPhase {
     device: DeviceSlot,
     world: World,
     given_up: policy::GivenUp,
+    /// The algorithm of the last update with changes.
+    last: Algorithm,
     look_up: Scratch<LookUp>,
     search: Scratch<Search>,
     comparison: Scratch<Comparison>,

@@ -120,10 +120,10 @@ impl BroadPhase {
         self.world.tree.get(&self.world)
     }
 
-    /// Returns the occupied cells of a grid like that of the last update, or the leaves of its tree, for pictures. There are none if the
-    /// last update needed neither. Takes time and memory as a search.
+    /// Returns the occupied cells of a grid like that of the last update with changes, or the leaves of its tree, for pictures. There
+    /// are none if it needed neither. Takes time and memory as a search.
     pub fn cells(&self) -> Vec<OccupiedCell> {
-        match self.report.plan.algorithm {
+        match self.last {
             Algorithm::Grid => occupied_cells(&self.world.boxes),
             Algorithm::Tree | Algorithm::LookUp => self.index().occupied_leaves(),
             _ => Vec::new(),

@@ -71,7 +71,8 @@ impl Search {
         let names = is_listed.then_some(&self.listed.ids[..]);
         if matches!(algorithm, Algorithm::Brute | Algorithm::Nothing) {
             let name = |place: u32| names.map_or(place, |names| names[place as usize]);
-            let found = self.all_pairs.hits[0].pairs.iter().map(|pair| Pair { a: name(pair.a), b: name(pair.b) });
+            let found =
+                self.all_pairs.hits[0].pairs.iter().map(|pair| Pair { a: name(pair.a), b: name(pair.b) });
             task.events.compare_sorted(world.present.iter(), found, task.kept);
             return false;
         }

@@ -24,6 +24,8 @@ struct Fresh {
     sorted: OnceLock<BoxIndex>,
     /// Held by the query that sorts. The others go on with the tree as it is.
     sorting: Mutex<()>,
+    /// The empty list of changes, for its memory.
+    no_changes: Vec<u32>,
 }
 
 /// A tree of boxes as they were.
@@ -54,9 +56,9 @@ impl Tree {
 
     #[cold]
     fn make_stale(&mut self) {
-        if let Some(Fresh { index, sorted, .. }) = self.fresh.take() {
+        if let Some(Fresh { index, sorted, no_changes: changed, .. }) = self.fresh.take() {
             let index = sorted.into_inner().unwrap_or(index);
-            *self.stale_mut() = Stale { index, changed: Vec::new(), knows_changes: true };
+            *self.stale_mut() = Stale { index, changed, knows_changes: true };
         }
     }
 
@@ -82,6 +84,7 @@ impl Tree {
             stale.changed.extend_from_slice(&world.changed);
         } else {
             stale.changed.clear();
+            stale.index.drop_peak(world.present.len());
         }
     }
 
@@ -104,29 +107,34 @@ impl Tree {
         let Stale { mut index, mut changed, knows_changes } = stale;
         changed.extend_from_slice(&world.changed);
         index.renew(&world.boxes, knows_changes.then_some(&changed), world.present.iter());
-        Fresh { index, ..Fresh::default() }
+        Fresh::new(index, changed)
     }
 
     /// Makes the tree fresh, with its boxes sorted, for look-ups of the changed ones. Returns it, and how many boxes were read.
     pub(super) fn follow(&mut self, world: &World) -> (&BoxIndex, usize) {
         self.make_stale();
-        let Stale { index, mut changed, knows_changes } = std::mem::take(self.stale_mut());
+        let Stale { mut index, mut changed, knows_changes } = std::mem::take(self.stale_mut());
         changed.extend_from_slice(&world.changed);
-        let mut fresh = Fresh { index, ..Fresh::default() };
         let known = knows_changes.then_some(&changed[..]);
-        let read = fresh.index.follow(&world.boxes, known, world.present.iter());
+        let read = index.follow(&world.boxes, known, world.present.iter());
+        let fresh = Fresh::new(index, changed);
         (&self.fresh.get_or_init(|| fresh).index, read)
     }
 
     /// Takes over a tree that was sorted just now from all boxes. The one so far is left in its place, for its memory.
     pub(super) fn adopt(&mut self, sorted: &mut BoxIndex) {
         self.make_stale();
-        let index = std::mem::replace(sorted, std::mem::take(&mut self.stale_mut().index));
-        self.fresh = Fresh { index, ..Fresh::default() }.into();
+        let Stale { index, changed, .. } = std::mem::take(self.stale_mut());
+        self.fresh = Fresh::new(std::mem::replace(sorted, index), changed).into();
     }
 }
 
 impl Fresh {
+    fn new(index: BoxIndex, mut changes: Vec<u32>) -> Self {
+        changes.clear();
+        Self { index, no_changes: changes, ..Self::default() }
+    }
+
     /// Sorts the boxes for this and later queries, unless another query does it just now. Both orders are held until the boxes change.
     #[cold]
     fn sort(&self, world: &World) -> &BoxIndex {

@@ -102,6 +102,7 @@ impl BroadPhase {
     /// Adds an outcome to the report, and applies the events to the kept pairs. Returns false if it was given up.
     fn take(&mut self, outcome: Outcome) -> Result<bool, Error> {
         let has_replaced_kept = outcome.has_replaced_kept;
+        self.last = outcome.plan.algorithm;
         let is_done = self.report.add(outcome, &self.config)?;
         if is_done && !has_replaced_kept {
             self.apply_events()?;

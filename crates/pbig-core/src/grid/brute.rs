@@ -46,7 +46,14 @@ impl Block {
 
 /// Tests each box against those behind it.
 #[inline(always)]
-fn test_all(simd: impl Simd, boxes: &[Aabb], blocks: &[Block], ids: &[u32], rule: &Rule<'_>, hits: &mut Hits) {
+fn test_all(
+    simd: impl Simd,
+    boxes: &[Aabb],
+    blocks: &[Block],
+    ids: &[u32],
+    rule: &Rule<'_>,
+    hits: &mut Hits,
+) {
     for (i, &id) in ids.iter().enumerate() {
         let (aabb, from) = (&boxes[id as usize], hits.pairs.len());
         // The first block also has the box itself and those before it.

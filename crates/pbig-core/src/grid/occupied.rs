@@ -1,7 +1,7 @@
 //! The occupied cells of a grid, for pictures.
 
-use super::cells::steps_portable;
 use super::Grid;
+use super::cells::steps_portable;
 use super::spacing::GridPlan;
 use crate::Aabb;
 

@@ -72,6 +72,9 @@ pub struct BoxIndex {
     looked_at: Count,
     /// Nodes for queries to look at before a sort pays; none if no number of them is enough.
     sort_after: Option<u64>,
+    /// Buffers for few changed boxes: these in the order of places, and the nodes of a level above them.
+    order: Vec<u64>,
+    level: Vec<u32>,
 }
 
 /// A count on a cache line of its own: queries of other threads read what would lie beside it.

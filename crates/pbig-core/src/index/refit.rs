@@ -15,6 +15,10 @@ const PIECE: usize = 256;
 /// Leaves between the one that is read and the one whose boxes are asked for.
 const READ_AHEAD: usize = 3;
 
+/// Boxes whose memory is never given back, and how many times the needed memory is a peak's.
+const SMALL: usize = 8192;
+const PEAK: usize = 8;
+
 impl BoxIndex {
     /// Takes the boxes as they are now: `boxes` by id, [`Aabb::NOWHERE`] for an absent one. `changed` are the ids whose boxes
     /// may differ from those at the last call, in any order, repeated or not; without it any box may differ. Ids beyond the list have
@@ -63,12 +67,7 @@ impl BoxIndex {
     }
 
     /// Reads the changed boxes, if they are few, or all. Returns the number of boxes that were read.
-    fn read(
-        &mut self,
-        boxes: &[Aabb],
-        changed: Option<&[u32]>,
-        present: impl Iterator<Item = u32>,
-    ) -> usize {
+    fn read(&mut self, boxes: &[Aabb], changed: Option<&[u32]>, present: impl Iterator<Item = u32>) -> usize {
         self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
         let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < boxes.len();
         let few = changed.filter(is_few);
@@ -94,9 +93,10 @@ impl BoxIndex {
                 self.add(id, boxes);
             }
         }
-        let mut order = Vec::new();
+        let mut order = std::mem::take(&mut self.order);
         self.in_order(ids, &mut order);
         dispatch!(Self::put_all, self, boxes, &order);
+        self.order = order;
     }
 
     /// Writes ids in the order of their places: place and id in one word.
@@ -110,7 +110,8 @@ impl BoxIndex {
     /// Stores boxes in their places, and passes the bounds of their nodes on, level by level.
     #[inline(always)]
     fn put_all(simd: impl Simd, index: &mut Self, boxes: &[Aabb], order: &[u64]) {
-        let mut nodes: Vec<u32> = Vec::new();
+        let mut nodes = std::mem::take(&mut index.level);
+        nodes.clear();
         for word in order {
             let (place, id) = ((word >> 32) as u32, *word as u32);
             if place != NONE {
@@ -143,6 +144,7 @@ impl BoxIndex {
             }
             nodes.truncate(parents);
         }
+        index.level = nodes;
     }
 
     /// Clears the places of all boxes, without a pass over ids that have none.
@@ -262,6 +264,7 @@ impl BoxIndex {
     fn lay_out(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>, split: Option<u32>) {
         let all = present.map(|id| (id, &boxes[id as usize])).filter(|(_, aabb)| aabb.is_valid());
         let mut entries: Vec<Entry> = all.map(|(id, aabb)| Entry::new(id, aabb)).collect();
+        self.drop_peak(entries.len());
         self.forget_places();
         self.nodes.clear();
         self.parents.clear();
@@ -287,6 +290,13 @@ impl BoxIndex {
             self.has_moved = false;
         }
         self.plan_sort();
+    }
+
+    /// Becomes empty if so many boxes need far less memory than there is.
+    pub(crate) fn drop_peak(&mut self, boxes: usize) {
+        if self.nodes.capacity() > PEAK * (boxes + SMALL) / LANES {
+            *self = Self::default();
+        }
     }
 
     /// Makes the leaves of a class; returns their numbers.

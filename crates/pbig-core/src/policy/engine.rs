@@ -9,7 +9,7 @@ const LOOK_UP_FROM_BOXES: usize = 16;
 
 /// Maximum number of nodes looked at and boxes met in look-ups, for each box of the world. A node counts as nine in the work: look-ups
 /// that are given up take at most 64 more for each box than a search.
-const LOOK_UP_TO_NODES_PER_BOX: u64 = 7;
+const LOOK_UP_TO_NODES_PER_BOX: u64 = 6;
 
 /// Maximum share of present boxes among all ids, as one in this number, for a search to list them: copying a box takes about as
 /// long as reading an id without one.
@@ -75,7 +75,7 @@ mod tests {
     fn few_changes_are_looked_up() {
         assert!(may_look_up(800, 100) && !may_look_up(800, 101));
         assert!(may_look_up(16, 1) && !may_look_up(15, 1));
-        assert_eq!(look_up_to_nodes(1000), 7000);
+        assert_eq!(look_up_to_nodes(1000), 6000);
     }
 
     #[test]

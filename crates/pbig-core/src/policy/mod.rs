@@ -56,7 +56,7 @@ pub(crate) const NS_PER_BOX: f64 = 40.0;
 pub(crate) const NS_PER_CANDIDATE: f64 = 0.35;
 pub(crate) const NS_PER_OVERSIZE_TEST: f64 = 1.5;
 
-/// Minimum id for which a jump far above the known ids is an error: the tables take 61 bytes for each id below.
+/// Minimum id for which a jump far above the known ids is an error: the tables take 65 bytes for each id below.
 pub(crate) const SPARSE_FROM_ID: u32 = 1 << 24;
 
 /// Maximum factor between a new id and the number of known ids, for ids from [`SPARSE_FROM_ID`] on.
