@@ -198,8 +198,7 @@ impl DebugRenderBackend for Canvas {
 
 #[test]
 fn boxes_and_cells_are_drawn_with_twelve_lines_each() {
-    let config =
-        Config { engine: Some(Engine::Grid), backend: Backend::Cpu, ..PbigConfig::DEFAULT.into() };
+    let config = Config { engine: Some(Engine::Grid), backend: Backend::Cpu, ..PbigConfig::DEFAULT.into() };
     let mut world = World::with_gravity(glam::Vec3::ZERO);
     for i in 0..64 {
         let at = glam::vec3((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32) * 5.0;

@@ -1,9 +1,9 @@
 //! The colliders of a world by handle, their boxes in the core, and the events for the narrow phase.
 
 use crate::events::{EventWriter, PairEvent, handles};
-use crate::scene_query::SceneQuery;
 use crate::order::PairOrder;
 use crate::registry::ColliderRegistry;
+use crate::scene_query::SceneQuery;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
 use crate::{Bounds, BoxStore, Handle, HandlePair, Margins, Scene, Tree};

@@ -18,13 +18,13 @@ mod drawn;
 mod events;
 mod filter;
 mod handle;
-mod scene_query;
 mod listed;
 mod margin;
 mod order;
 pub mod policy;
 mod registry;
 mod scene;
+mod scene_query;
 #[cfg(feature = "shadow")]
 pub mod shadow;
 #[cfg(feature = "serde")]
@@ -40,11 +40,11 @@ pub use drawn::{DebugRenderParts, DrawnBox, box_edges};
 pub use events::PairEvent;
 pub use filter::{BodyKind, Groups, accepted_kinds, filter_of};
 pub use handle::{Handle, HandlePair};
-pub use scene_query::SceneQuery;
 pub use margin::Margins;
 pub use order::size_class;
 pub use pbig_core::{Aabb, Backend, Error, PairDevice, ProxyFilter, Report};
 pub use scene::{Proxy, Scene};
+pub use scene_query::SceneQuery;
 #[cfg(feature = "serde")]
 pub use snapshot::Snapshot;
 pub use stats::{Stats, Totals};

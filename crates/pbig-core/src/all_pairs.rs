@@ -1,10 +1,9 @@
 //! All pairs of a list of boxes, or those of two sets: by grids, by a tree where a grid would test too many, or by testing every
 //! pair of a few.
 
+use crate::budget::Budget;
 use crate::device_slot::DeviceSlot;
-use crate::grid::{
-    ById, Grid, GridPlan, Hits, Receiver, Rule, Sorted, TwoGrids, brute_force, brute_force_across,
-};
+use crate::grid::{ById, Grid, GridPlan, Hits, Receiver, Rule, TwoGrids, brute_force, brute_force_across};
 use crate::index::BoxIndex;
 use crate::memory::{Scratch, ShrinkingVec};
 use crate::outcome::{End, Outcome};
@@ -14,7 +13,7 @@ use crate::policy::{self, PARALLEL_FROM_BOXES, search};
 use crate::report::{Checks, Clock, stage};
 use crate::streamed;
 use crate::{Aabb, Algorithm, Backend, Boxes, Config, Engine, Keys, Pair, Plan, ProxyFilter, SearchRequest};
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A search: boxes, filters and settings.
 #[derive(Clone, Copy)]
@@ -31,12 +30,23 @@ pub(crate) struct Request<'a> {
     pub(crate) config: &'a Config,
     /// The groups by which found pairs are counted, for [`Groups::gather`]. Without one they are not counted.
     pub(crate) grouping: Option<Grouping>,
+    /// The boxes are about those of the last search: a grid that was given up then is not tried at once.
+    pub(crate) is_repeated: bool,
 }
 
 impl<'a> Request<'a> {
     /// Makes a search for all pairs of boxes, whose groups are not counted.
     pub(crate) fn new(boxes: &'a [Aabb], config: &'a Config) -> Self {
-        Self { boxes, others: None, filters: None, keys: None, receiver: None, config, grouping: None }
+        Self {
+            boxes,
+            others: None,
+            filters: None,
+            keys: None,
+            receiver: None,
+            config,
+            grouping: None,
+            is_repeated: false,
+        }
     }
 
     /// Makes a search for the pairs of one set.
@@ -63,7 +73,7 @@ impl<'a> Request<'a> {
     pub(crate) fn rule(&self, found: &'a AtomicU64) -> Rule<'a> {
         let Self { filters, keys, receiver, .. } = *self;
         let max_pairs = if receiver.is_some() { u64::MAX } else { self.config.limits.pairs() };
-        Rule { filters, keys, receiver, max_pairs, found }
+        Rule { filters, keys, receiver, max_pairs, found, budget: None }
     }
 
     /// Returns true if every pair should be tested.
@@ -84,6 +94,8 @@ pub(crate) struct Store {
     pub(crate) tree: BoxIndex,
     /// Both sets in one list, for a tree.
     both_sets: Scratch<Vec<Aabb>>,
+    /// Grids that took too much work.
+    given_up: policy::GivenUp,
 }
 
 impl Store {
@@ -129,7 +141,7 @@ impl AllPairs {
         let sum = |of: fn(&Hits) -> u64| self.hits.iter().map(of).sum::<u64>();
         let (made, overlaps) = (sum(|hits| hits.tests), sum(|hits| hits.overlaps));
         outcome.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
-        outcome.work = made + sum(|hits| hits.runs);
+        outcome.work += sum(Hits::work);
         if self.hits.iter().any(Hits::is_full) || self.count() > rule.max_pairs {
             return Outcome { end: End::TooManyPairs, ..outcome };
         }
@@ -160,8 +172,26 @@ impl AllPairs {
     }
 
     fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, outcome: &mut Outcome) {
+        let is_hard = request.is_repeated && store.given_up.forbids(0);
+        if request.config.engine != Some(Engine::Tree) && !is_hard {
+            let is_done = self.search_grid(request, store, rule, outcome);
+            store.given_up.note(!is_done, 0);
+            if is_done {
+                return;
+            }
+        }
+        self.search_tree(request, (&mut store.tree, &mut store.both_sets), rule, outcome);
+    }
+
+    /// Finds the pairs in a grid. Returns false if that takes too much work.
+    fn search_grid(
+        &mut self,
+        request: &Request<'_>,
+        store: &mut Store,
+        rule: &Rule<'_>,
+        outcome: &mut Outcome,
+    ) -> bool {
         let (boxes, workers) = (request.boxes, self.hits.len());
-        let Store { grid, two_grids, tree, both_sets, .. } = store;
         let mut clock = Clock::start();
         let plan = {
             stage!("plan");
@@ -171,41 +201,25 @@ impl AllPairs {
         let sorted = {
             stage!("map");
             match request.others {
-                Some(others) => two_grids.build(plan, [boxes, others], workers),
-                None => grid.build(plan, boxes, workers),
+                Some(others) => store.two_grids.build(plan, [boxes, others], workers),
+                None => store.grid.build(plan, boxes, workers),
             }
         };
         outcome.stages.map += clock.lap();
-        let is_grid = self.is_for_grid(request, &sorted);
-        if is_grid {
-            stage!("check");
-            sorted.search(rule, &mut self.hits);
-        }
-        outcome.stages.check += clock.lap();
         outcome.plan = Plan::of_grid(&plan, sorted.boxes(), sorted.oversize_count());
-        if !is_grid {
-            self.search_tree(request, (tree, both_sets), rule, outcome);
-        }
+        stage!("check");
+        let most = search::grid_up_to_work(sorted.boxes());
+        let is_sure = request.config.engine == Some(Engine::Grid)
+            || rule.receiver.is_some() && sorted.takes_at_most(most);
+        let is_done = self.run_within((!is_sure).then_some(most), request, rule, outcome, |rule, hits| {
+            sorted.search(rule, hits);
+        });
+        outcome.stages.check += clock.lap();
+        is_done
     }
 
-    /// Returns true if a grid finds the pairs with less work than a tree.
-    fn is_for_grid(&mut self, request: &Request<'_>, sorted: &Sorted<'_>) -> bool {
-        match request.config.engine {
-            Some(Engine::Grid) => return true,
-            Some(Engine::Tree) => return false,
-            Some(Engine::LookUp) | None => {}
-        }
-        let (boxes, work) = (sorted.boxes(), sorted.work(self.hits.len()));
-        if search::is_light(boxes, work) {
-            return true;
-        }
-        let (hits, step) = (&mut self.hits[0], search::sample_one_in(sorted.seekers(), work));
-        let vain = sorted.vain_work(step, request.filters, hits);
-        hits.begin_for(request.grouping);
-        search::is_light(boxes, vain)
-    }
-
-    /// Sorts all boxes into a tree, and finds the pairs there.
+    /// Finds the pairs in a tree of all boxes, or where that takes too much work, by streamed segment trees: a tree does not cut boxes
+    /// apart that cross.
     fn search_tree(
         &mut self,
         request: &Request<'_>,
@@ -220,21 +234,46 @@ impl AllPairs {
             tree.sort_sets(boxes, split);
         }
         outcome.stages.map += clock.lap();
-        {
-            stage!("check");
-            let most = search::join_up_to_work(boxes.len());
-            let may_stream = request.config.engine != Some(Engine::Tree);
-            let is_heavy = may_stream && tree.vain_work(split, most, &mut self.hits[0]) > most;
-            self.hits[0].begin_for(request.grouping);
-            // A tree does not cut boxes apart that cross.
-            if is_heavy {
-                streamed::find_pairs(boxes, split, rule, &mut self.hits);
-            } else {
-                tree.find_pairs(split, rule, &mut self.hits);
-            }
+        stage!("check");
+        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: tree.len() as u32, ..Plan::default() };
+        let is_sure = request.config.engine == Some(Engine::Tree);
+        let most = search::join_up_to_work(tree.len());
+        let is_done = self.run_within((!is_sure).then_some(most), request, rule, outcome, |rule, hits| {
+            tree.find_pairs(split, rule, hits);
+        });
+        if !is_done {
+            streamed::find_pairs(boxes, split, rule, &mut self.hits);
         }
         outcome.stages.check += clock.lap();
-        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: outcome.plan.boxes, ..Plan::default() };
+    }
+
+    /// Runs a search that may take at most some work in vain, or any. Returns false, and leaves no pairs, if it takes more. A receiver
+    /// cannot give pairs back, so it gets none before they are known to be all: the search runs twice.
+    fn run_within(
+        &mut self,
+        most: Option<u64>,
+        request: &Request<'_>,
+        rule: &Rule<'_>,
+        outcome: &mut Outcome,
+        search: impl Fn(&Rule<'_>, &mut [Hits]),
+    ) -> bool {
+        if let Some(most) = most {
+            let budget = Budget::new(most);
+            let nobody = &|_: &[Pair]| ();
+            let receiver = rule.receiver.map(|_| nobody as Receiver<'_>);
+            search(&Rule { receiver, budget: Some(&budget), ..*rule }, &mut self.hits);
+            if !budget.is_over() && receiver.is_none() {
+                return true;
+            }
+            outcome.work += self.hits.iter().map(Hits::work).sum::<u64>();
+            self.begin(request);
+            rule.found.store(0, Ordering::Relaxed);
+            if budget.is_over() {
+                return false;
+            }
+        }
+        search(rule, &mut self.hits);
+        true
     }
 
     /// Gathers what was found, for sorting.

@@ -19,8 +19,8 @@ impl Budget {
         self.spent.fetch_add(work, Ordering::Relaxed);
     }
 
-    /// Returns true if more than the limit was spent. The final answer depends on the work alone, not on the threads: threads that
-    /// stop early have more left to do than the limit allows.
+    /// Returns true if more than the limit was spent. Amounts that do not depend on threads or their order make an answer at the end
+    /// that does not either: threads that stop early leave a sum above the limit.
     pub(crate) fn is_over(&self) -> bool {
         self.spent.load(Ordering::Relaxed) > self.limit
     }

@@ -98,8 +98,9 @@ fn success(found: &DeviceFound, time: Duration) -> Outcome {
 /// Returns an error if an answer has too many pairs, or not the form that a device promises.
 fn check(found: &DeviceFound, request: &SearchRequest<'_>) -> Result<(), DeviceFailure> {
     let boxes = request.boxes.len();
-    if !are_pairs(&found.pairs, boxes) || found.valid as usize > boxes {
-        let form = format!("pairs a < b < {boxes}, and at most {boxes} valid boxes");
+    let is_counted = found.valid as usize <= boxes && (found.valid > 1 || found.pairs.is_empty());
+    if !are_pairs(&found.pairs, boxes) || !is_counted {
+        let form = format!("pairs a < b < {boxes}, and at most {boxes} valid boxes, two or more for a pair");
         return Err(DeviceFailure::Failed(format!("the device's answer is malformed: {form} were expected")));
     }
     if found.pairs.len() as u64 > request.max_pairs { Err(DeviceFailure::TooManyPairs) } else { Ok(()) }

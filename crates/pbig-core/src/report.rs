@@ -96,9 +96,8 @@ pub struct Checks {
 }
 
 /// Maximum [`Report::work`] for each box and pair, in binary logarithms of the number of boxes, for every shape, motion and history
-/// of the boxes. A pair counts if its boxes overlap, also if filters or keys exclude it. Measured, not proven: docs/STRESS.md has the
-/// worst case that was found.
-pub const WORK_LIMIT: u64 = 64;
+/// of the boxes. A pair counts if its boxes overlap, also if filters or keys exclude it. docs/ARCHITECTURE.md says why it holds.
+pub const WORK_LIMIT: u64 = 128;
 
 /// The report on the last call of a [`crate::Finder`] or [`crate::BroadPhase`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -115,11 +114,10 @@ pub struct Report {
     /// Tests made. A device may report an estimate, without unnecessary and redundant
     /// ones.
     pub checks: Checks,
-    /// The work on the CPU in counts: tests made, runs of cells and nodes of a tree looked at, ids without a box that a
-    /// rebuild reads. In an edit an entry of a list
-    /// counts as 16 and a test against an oversize box as 4, because they take longer. An edit that was given up counts as the work
-    /// that it was allowed. At most [`crate::WORK_LIMIT`] for each box, change and pair, times the binary logarithm of the
-    /// number of boxes, unless [`crate::Backend::Brute`] was asked for.
+    /// The work on the CPU, in tests of eight boxes at once: a row of cells counts as 32, a node of a tree as 8, an exact test as 4,
+    /// about as long as they take. Sorting boxes is not counted, but ids without a box that a search reads are, and so is what was
+    /// given up. At most [`crate::WORK_LIMIT`] for each box, change and pair, times the binary logarithm of the number of boxes,
+    /// unless [`crate::Backend::Brute`] or an engine was asked for.
     pub work: u64,
     /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).
     pub pairs: u64,

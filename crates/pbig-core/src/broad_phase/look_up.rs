@@ -44,12 +44,13 @@ impl LookUp {
         self.gather(task.events, world.ids());
         let sum = |of: fn(&Thread) -> u64| self.threads.iter().map(of).sum::<u64>();
         let (nodes, met) = (sum(|thread| thread.nodes), sum(|thread| thread.met));
-        let made = index.note(nodes) * BLOCK as u64;
+        let made = nodes * BLOCK as u64;
         outcome.stages.check = clock.lap();
         outcome.checks = Checks { made, unnecessary: made - met, redundant: 0 };
         outcome.work = read as u64 + made + nodes + met;
         outcome.plan = Plan { algorithm: Algorithm::LookUp, boxes: world.valid, ..Plan::default() };
         outcome.end = if budget.is_over() { End::GivenUp } else { End::Done };
+        outcome.may_try_again = tree.note_look_ups(nodes, budget.is_over());
         outcome
     }
 
@@ -145,11 +146,16 @@ impl Thread {
     #[inline(always)]
     fn compare(&mut self, simd: impl Simd, world: &World, kept: &Kept, id: u32) {
         let (lower, later) = kept.rows_of(id);
+        if world.is_filtered {
+            let filter = &world.filters[id as usize];
+            self.now.retain(|other| filter.allows(&world.filters[*other as usize]));
+        }
         sort_few(simd, &mut self.now);
         let at = self.now.partition_point(|other| *other < id);
         let behind = at + usize::from(self.now.get(at) == Some(&id));
         let is_same = equal(lower, &self.now[..at]) && equal(later, &self.now[behind..]);
-        if !is_same || world.is_filtered || world.has_removed() {
+        let was_removed = |other: &u32| world.was_removed(*other);
+        if !is_same || world.has_removed() && (was_removed(&id) || self.now.iter().any(was_removed)) {
             self.compare_all(world, (lower, later), id);
         }
     }
@@ -159,11 +165,9 @@ impl Thread {
     fn compare_all(&mut self, world: &World, (lower, later): (&[u32], &[u32]), id: u32) {
         let Self { now, was, added, removed, dropped, .. } = self;
         let is_own = |other: u32| other > id || other < id && !world.has_changed(other);
+        now.retain(|other| is_own(*other));
         was.clear();
         was.extend(lower.iter().chain(later).copied().filter(|other| is_own(*other)));
-        let filter = &world.filters[id as usize];
-        let allows = |other: u32| !world.is_filtered || filter.allows(&world.filters[other as usize]);
-        now.retain(|other| is_own(*other) && allows(*other));
         if world.has_removed() {
             let ended = |other: u32| world.was_removed(id) || world.was_removed(other);
             dropped.extend(was.iter().filter(|other| ended(**other)).map(|&other| Pair::new(id, other)));

@@ -38,7 +38,8 @@ impl Search {
             (boxes, filters) = (&self.listed.boxes, &self.listed.filters);
         }
         let all = Boxes { boxes, filters: world.is_filtered.then_some(&filters[..]), keys: None };
-        self.groups.may_repeat = device.is_some();
+        let is_on_device = device.is_some();
+        self.groups.may_repeat = is_on_device;
         let parts = (&mut self.all_pairs, &mut self.store);
         let mut outcome = search(parts, &all, task.config, device);
         outcome.work += (boxes.len() - world.present.len()) as u64;
@@ -49,7 +50,9 @@ impl Search {
             tree.adopt(&mut self.store.tree);
         }
         let mut clock = Clock::start();
-        outcome.has_replaced_kept = self.compare(task, outcome.plan.algorithm, is_listed);
+        let is_brute =
+            !is_on_device && matches!(outcome.plan.algorithm, Algorithm::Brute | Algorithm::Nothing);
+        outcome.has_replaced_kept = self.compare(task, is_brute, is_listed);
         outcome.stages.diff = clock.lap();
         outcome
     }
@@ -62,14 +65,14 @@ impl Search {
     }
 
     /// Compares the found pairs with the kept ones. Returns true if it has replaced these.
-    fn compare(&mut self, task: &mut Task<'_>, algorithm: Algorithm, is_listed: bool) -> bool {
+    fn compare(&mut self, task: &mut Task<'_>, is_brute: bool, is_listed: bool) -> bool {
         stage!("diff");
         let world = task.world;
         if world.has_removed() {
             drop_pairs_of_removed(world, task.kept);
         }
         let names = is_listed.then_some(&self.listed.ids[..]);
-        if matches!(algorithm, Algorithm::Brute | Algorithm::Nothing) {
+        if is_brute {
             let name = |place: u32| names.map_or(place, |names| names[place as usize]);
             let found =
                 self.all_pairs.hits[0].pairs.iter().map(|pair| Pair { a: name(pair.a), b: name(pair.b) });
@@ -96,7 +99,10 @@ fn search(
     let grouping = Some(Grouping::new(all.boxes.len()));
     match device {
         Some(device) => all_pairs.find_on(device, all, config, grouping),
-        None => all_pairs.find(&Request { grouping, ..Request::of_one(all, config) }, store),
+        None => {
+            let request = Request { grouping, is_repeated: true, ..Request::of_one(all, config) };
+            all_pairs.find(&request, store)
+        }
     }
 }
 

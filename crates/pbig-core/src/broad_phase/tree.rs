@@ -121,6 +121,11 @@ impl Tree {
         (&self.fresh.get_or_init(|| fresh).index, read)
     }
 
+    /// Notes how many nodes the look-ups have looked at. Returns true if they may take less work next time, although they were given up.
+    pub(super) fn note_look_ups(&mut self, nodes: u64, is_given_up: bool) -> bool {
+        self.fresh.get_mut().is_some_and(|fresh| fresh.index.note_look_ups(nodes, is_given_up))
+    }
+
     /// Takes over a tree that was sorted just now from all boxes. The one so far is left in its place, for its memory.
     pub(super) fn adopt(&mut self, sorted: &mut BoxIndex) {
         self.make_stale();

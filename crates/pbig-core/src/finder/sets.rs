@@ -3,7 +3,7 @@
 use crate::grid::ById;
 use crate::grid::bounds::{bounds_of, spread_evenly};
 use crate::parallel::{SharedSlice, ensure_scratch, map, piece_range};
-use crate::policy::PARALLEL_FROM_BOXES;
+use crate::policy::{FEW_BOXES, PARALLEL_FROM_BOXES};
 use crate::{Aabb, Boxes, CrossPair, Keys, NO_KEY, Pair, ProxyFilter};
 use std::ops::Range;
 
@@ -40,10 +40,10 @@ impl Sets {
     /// Takes two sets. Copies them unless all boxes seem to overlap the bounds of the other set.
     pub(super) fn take(&mut self, sets: [&Boxes<'_>; 2]) {
         let [a, b] = sets.map(|set| set.boxes);
-        let near_b = bounds_of_valid(b);
-        self.are_copied = !seem_near(a, &near_b) || !seem_near(b, &bounds_of_valid(a));
+        // A few boxes are tested against the others sooner than these are looked at.
+        self.are_copied = a.len().min(b.len()) > FEW_BOXES && !are_near(a, b);
         self.dropped = 0;
-        let lens = if self.are_copied { self.copy_near(a, b, &near_b) } else { [a.len(), b.len()] };
+        let lens = if self.are_copied { self.copy_near(a, b) } else { [a.len(), b.len()] };
         self.copies.iter_mut().zip(lens).for_each(|(copies, len)| copies.len = len);
         self.fill(sets.map(|set| set.filters), |copy| &mut copy.filters, ProxyFilter::ALL);
         self.fill(sets.map(|set| set.keys), |copy| &mut copy.keys, [NO_KEY; 4]);
@@ -118,10 +118,10 @@ impl Sets {
 
     /// Copies the valid boxes of each set that overlap the bounds of the other set. Drops more of them while more than a quarter of
     /// the boxes is dropped, because the bounds of the boxes that are left are smaller. Returns how many are left.
-    fn copy_near(&mut self, a: &[Aabb], b: &[Aabb], near_b: &Aabb) -> [usize; 2] {
+    fn copy_near(&mut self, a: &[Aabb], b: &[Aabb]) -> [usize; 2] {
         let [first, second] = &mut self.copies;
         let (mut first, mut second) = (Side::new(first, a.len()), Side::new(second, b.len()));
-        let valid = first.take(a, near_b) + second.take(b, &first.bounds);
+        let valid = first.take(a, &bounds_of_valid(b)) + second.take(b, &first.bounds);
         let (mut before, mut left) = (a.len() + b.len(), first.len + second.len);
         while 4 * left < 3 * before {
             first.keep_near(&second.bounds);
@@ -132,6 +132,11 @@ impl Sets {
         self.dropped = valid - (lens[0] + lens[1]) as u64;
         lens
     }
+}
+
+/// Returns true if the boxes of each set seem to overlap the bounds of the other one.
+fn are_near(a: &[Aabb], b: &[Aabb]) -> bool {
+    seem_near(a, &bounds_of_valid(b)) && seem_near(b, &bounds_of_valid(a))
 }
 
 /// Returns true if a sample of a set is valid, and overlaps a box.

@@ -1,10 +1,10 @@
 //! Brute force: every pair is tested.
 
-use super::hits::{Hits, Rule};
-use super::record::Record;
+use super::hits::{BATCH, Hits, Rule};
 use super::simd::{BLOCK, EightBoxes, Simd, dispatch};
 use crate::parallel::run_with;
 use crate::{Aabb, Pair};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Number of boxes of the larger set in a piece of work.
 const PIECE: usize = 4096;
@@ -13,16 +13,7 @@ const PIECE: usize = 4096;
 pub(crate) fn brute_force(boxes: &[Aabb], rule: &Rule<'_>, hits: &mut Hits) -> usize {
     let mut blocks = std::mem::take(&mut hits.blocks);
     let mut ids = std::mem::take(&mut hits.ids);
-    blocks.clear();
-    ids.clear();
-    for (id, aabb) in (0u32..).zip(boxes).filter(|(_, aabb)| aabb.is_valid()) {
-        let lane = ids.len() % BLOCK;
-        if lane == 0 {
-            blocks.push(Block::EMPTY);
-        }
-        ids.push(id);
-        blocks.iter_mut().next_back().into_iter().for_each(|block| block.set(lane, aabb));
-    }
+    fill_blocks((boxes, 0), &mut blocks, &mut ids);
     dispatch!(test_all, boxes, &blocks, &ids, rule, hits);
     let valid = ids.len();
     (hits.blocks, hits.ids) = (blocks, ids);
@@ -76,7 +67,7 @@ fn test_all(
 }
 
 /// Tests every valid box of a set against every one of another set, whose ids are behind those of the first; returns how many are
-/// valid.
+/// valid. The larger set is read once, where it lies.
 pub(crate) fn brute_force_across(
     first: &[Aabb],
     second: &[Aabb],
@@ -85,25 +76,60 @@ pub(crate) fn brute_force_across(
 ) -> usize {
     let sides = [(first, 0), (second, first.len() as u32)];
     let [few, (many, first_id)] = if first.len() <= second.len() { sides } else { [sides[1], sides[0]] };
+    let (mut blocks, mut ids) = (Vec::new(), Vec::new());
+    fill_blocks(few, &mut blocks, &mut ids);
+    let valid = AtomicUsize::new(ids.len());
     run_with(hits, many.len().div_ceil(PIECE), |hits, piece| {
         let start = piece * PIECE;
-        let many = &many[start..many.len().min(start + PIECE)];
-        test_piece(few, (many, first_id + start as u32), rule, hits);
+        let many = (&many[start..many.len().min(start + PIECE)], first_id + start as u32);
+        let seen = dispatch!(test_piece, (&blocks, &ids), many, rule, hits);
+        valid.fetch_add(seen, Ordering::Relaxed);
     });
-    first.iter().chain(second).filter(|aabb| aabb.is_valid()).count()
+    valid.into_inner()
 }
 
-/// Tests the valid boxes of a list, given with the id of its first one, against those of another list.
-fn test_piece(few: (&[Aabb], u32), many: (&[Aabb], u32), rule: &Rule<'_>, hits: &mut Hits) {
-    let records = |(boxes, first_id): (&[Aabb], u32)| {
-        let valid = boxes.iter().zip(first_id..).filter(|(aabb, _)| aabb.is_valid());
-        valid.map(|(aabb, id)| Record::new(*aabb, id, 0)).collect()
-    };
-    let (few, many): (Vec<Record>, Vec<Record>) = (records(few), records(many));
-    for one in few {
-        if hits.is_full {
-            return;
+/// Tests a few boxes against those of a list, given with the id of its first one. Returns how many of these are valid.
+#[inline(always)]
+fn test_piece(
+    simd: impl Simd,
+    (blocks, ids): (&[Block], &[u32]),
+    (many, first_id): (&[Aabb], u32),
+    rule: &Rule<'_>,
+    hits: &mut Hits,
+) -> usize {
+    let (mut from, mut valid) = (hits.pairs.len(), 0);
+    for (aabb, id) in many.iter().zip(first_id..).filter(|(aabb, _)| aabb.is_valid()) {
+        valid += 1;
+        for (block, Block(eight)) in blocks.iter().enumerate() {
+            let mut met = simd.overlaps_eight(eight, aabb);
+            while met != 0 {
+                hits.pairs.push(Pair::new(ids[block * BLOCK + met.trailing_zeros() as usize], id));
+                met &= met - 1;
+            }
         }
-        hits.test_run(&one, &many, rule);
+        if hits.pairs.len() - from >= BATCH {
+            hits.keep(from, rule);
+            from = hits.pairs.len();
+        }
+        if hits.is_full {
+            break;
+        }
+    }
+    hits.tests += (valid * ids.len()) as u64;
+    hits.keep(from, rule);
+    valid
+}
+
+/// Brings the valid ones of some boxes, given with the id of the first one, into blocks.
+fn fill_blocks((boxes, first_id): (&[Aabb], u32), blocks: &mut Vec<Block>, ids: &mut Vec<u32>) {
+    blocks.clear();
+    ids.clear();
+    for (aabb, id) in boxes.iter().zip(first_id..).filter(|(aabb, _)| aabb.is_valid()) {
+        let lane = ids.len() % BLOCK;
+        if lane == 0 {
+            blocks.push(Block::EMPTY);
+        }
+        ids.push(id);
+        blocks.iter_mut().next_back().into_iter().for_each(|block| block.set(lane, aabb));
     }
 }

@@ -10,8 +10,7 @@ use super::search::Sorted;
 use super::simd::{BLOCK, Simd, dispatch};
 use super::spacing::GridPlan;
 use crate::Aabb;
-use crate::parallel::{SharedSlice, ensure_scratch, map, piece_range, run};
-use crate::policy::search as policy;
+use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run};
 use std::ops::Range;
 
 /// Maximum number of buckets of the first sort: their write positions stay in the nearest cache.
@@ -19,9 +18,6 @@ const MAX_BUCKETS: usize = 2047;
 
 /// Approximate number of boxes in a bucket: they are sorted within the second cache.
 const BOXES_PER_BUCKET: usize = 2048;
-
-/// Number of cells that a thread looks at together.
-const CELLS_PIECE: usize = 1 << 18;
 
 /// Keys of boxes that are in no cell.
 const OVERSIZE: u32 = u32::MAX;
@@ -163,31 +159,13 @@ impl Grid {
     }
 }
 
-impl Grid {
-    /// Returns a number of tests that no box that is searched for exceeds, of those in the grid's cells.
-    fn most_tests(&self) -> u64 {
-        let Cells { shift, reach, .. } = self.plan.cells;
-        // A window has a box and its reach, and a box is shorter than that.
-        let along = |k: usize| (2 * reach[k] as u64 - 1).div_ceil(1 << shift) + 1;
-        let starts = &self.starts[..=self.plan.cells.count()];
-        let pieces = starts.len().div_ceil(CELLS_PIECE);
-        let fullest = map(pieces, |piece| {
-            let cells = &starts[piece * CELLS_PIECE..starts.len().min((piece + 1) * CELLS_PIECE + 1)];
-            cells.windows(2).map(|cell| cell[1] - cell[0]).max().unwrap_or(0)
-        });
-        let fullest = fullest.into_iter().max().unwrap_or(0);
-        (0..3).map(along).product::<u64>() * u64::from(fullest)
-    }
-}
-
 /// The grids of two sets.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TwoGrids([Grid; 2]);
 
 impl TwoGrids {
     /// Sorts the valid boxes of two sets, of which the second has the ids behind the first's, each into a grid. Boxes that are
-    /// searched for stay in their buckets, near those that they meet, unless an oversize box of the other set meets them in cells, or
-    /// cells are full: then the work is counted for some slots, and neighbours have to be alike.
+    /// searched for stay in their buckets, near those that they meet, unless an oversize box of the other set meets them in cells.
     pub(crate) fn build(&mut self, plan: GridPlan, boxes: [&[Aabb]; 2], workers: usize) -> Sorted<'_> {
         let [first, second] = &mut self.0;
         let first_split = first.bring_into_buckets(plan, boxes[0], 0, workers);
@@ -197,7 +175,7 @@ impl TwoGrids {
         let ((own, own_split), (other, split)) =
             if is_first_smaller { (first, second) } else { (second, first) };
         other.sort_buckets(split, workers);
-        if other.oversize.is_empty() && other.most_tests() <= policy::UNSORTED_UP_TO_TESTS {
+        if other.oversize.is_empty() {
             std::mem::swap(&mut own.records, &mut own.coarse);
         } else {
             own.sort_buckets(own_split, workers);

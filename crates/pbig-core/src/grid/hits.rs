@@ -8,9 +8,10 @@ use super::brute::Block;
 use super::record::Record;
 use super::simd::{BLOCK, Simd, eight_from, prefetch};
 use crate::boxes::share_no_key;
+use crate::budget::Budget;
 use crate::memory::ShrinkingVec;
 use crate::pairs::Grouping;
-use crate::policy::search::{WORK_OF_EXACT_TEST, WORK_OF_VAGUE_TEST};
+use crate::policy::search::{WORK_OF_EXACT_TEST, WORK_OF_VAGUE_TEST, in_vain};
 use crate::{Keys, Pair, ProxyFilter};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -24,7 +25,10 @@ const SLACK: usize = 8;
 const AHEAD: usize = 24;
 
 /// Pairs that a thread gathers before it accounts for them, or hands them over.
-const BATCH: usize = 4096;
+pub(super) const BATCH: usize = 4096;
+
+/// Work, in tests of codes, that is charged before a piece of work is done.
+pub(super) const CHARGED_FROM: u64 = 1 << 16;
 
 /// Receiver of pairs that are not listed, some at a time. Each thread calls it.
 pub(crate) type Receiver<'a> = &'a (dyn Fn(&[Pair]) + Sync);
@@ -65,12 +69,15 @@ pub(crate) struct Rule<'a> {
     pub(crate) max_pairs: u64,
     /// Pairs found by all threads.
     pub(crate) found: &'a AtomicU64,
+    /// The work that the search may take; none if it may take any.
+    pub(crate) budget: Option<&'a Budget>,
 }
 
 impl<'a> Rule<'a> {
     /// Makes a rule for a list of pairs, however many.
+    #[cfg(test)]
     pub(crate) fn listing(filters: Option<ById<'a, ProxyFilter>>, found: &'a AtomicU64) -> Self {
-        Self { filters, keys: None, receiver: None, max_pairs: u64::MAX, found }
+        Self { filters, keys: None, receiver: None, max_pairs: u64::MAX, found, budget: None }
     }
 }
 
@@ -86,16 +93,17 @@ pub(crate) struct Hits {
     pub(crate) group_shift: u32,
     /// Candidates tested.
     pub(crate) tests: u64,
-    /// Candidates that their codes leave to the exact test.
-    vague: u64,
-    /// Runs of cells, or nodes of a tree, looked at.
-    pub(crate) runs: u64,
+    /// Work besides a unit for each test: cells and nodes looked at, and what makes a test longer.
+    pub(crate) extra: u64,
     /// Overlapping boxes met, filtered ones included.
     pub(crate) overlaps: u64,
     /// Pairs that a receiver got.
     handed_over: u64,
     /// Number of listed pairs that were added to the count of all threads.
     accounted: usize,
+    /// Work and overlaps that were charged to a budget.
+    charged: (u64, u64),
+    /// No more pairs are wanted: they are too many, or the budget is spent.
     pub(super) is_full: bool,
     /// The boxes of [`brute_force`](super::brute_force), and their ids.
     pub(super) blocks: Vec<Block>,
@@ -112,12 +120,14 @@ pub(super) struct HitWriter<'a> {
     len: usize,
     /// Candidates tested.
     pub(super) tests: u64,
+    /// Work of looking at rows of cells.
+    pub(super) rows: u64,
 }
 
 impl<'a> HitWriter<'a> {
     /// Returns a writer without hits.
     pub(super) fn new(blocks: &'a mut [u64; HIT_ROOM]) -> Self {
-        Self { blocks, len: 0, tests: 0 }
+        Self { blocks, len: 0, tests: 0, rows: 0 }
     }
 
     /// Adds a hit unless its mask is empty. At most [`SLACK`] hits are added while there is no room.
@@ -149,8 +159,8 @@ impl Hits {
         self.groups.clear();
         self.groups.resize(groups, 0);
         self.group_shift = shift;
-        (self.tests, self.vague, self.runs, self.overlaps, self.handed_over) = (0, 0, 0, 0, 0);
-        (self.accounted, self.is_full) = (0, false);
+        (self.tests, self.extra, self.overlaps, self.handed_over) = (0, 0, 0, 0);
+        (self.accounted, self.charged, self.is_full) = (0, (0, 0), false);
     }
 
     /// Forgets the pairs, and gives back memory if as many as `needed` are expected.
@@ -160,17 +170,29 @@ impl Hits {
         self.pairs.settle(needed);
     }
 
-    /// Returns the work of the boxes in cells, in tests of codes.
-    pub(super) fn work_in_cells(&self) -> u64 {
-        self.runs + self.tests + self.vague * (WORK_OF_VAGUE_TEST - 1)
+    /// Returns the work so far, in tests of codes.
+    pub(crate) fn work(&self) -> u64 {
+        self.tests + self.extra
     }
 
-    /// Returns the work of oversize boxes, in tests of codes.
-    pub(super) fn work_of_oversize(&self) -> u64 {
-        (self.runs + self.tests) * WORK_OF_EXACT_TEST
+    /// Charges the work since the last charge, less what its overlaps pay for. All boxes of a search make the same charges whichever
+    /// threads search for them, so the sum is the same, too. A box that meets thousands does not pay for others that meet none.
+    pub(crate) fn charge(&mut self, budget: Option<&Budget>) {
+        let Some(budget) = budget else { return };
+        let (work, overlaps) = (self.work(), self.overlaps);
+        budget.charge(in_vain(work - self.charged.0, overlaps - self.charged.1));
+        self.charged = (work, overlaps);
+        self.is_full |= budget.is_over();
     }
 
-    /// Returns true if more pairs were found than may be.
+    /// As [`Hits::charge`], if the work is much.
+    pub(crate) fn charge_much(&mut self, budget: Option<&Budget>) {
+        if self.work() - self.charged.0 > CHARGED_FROM {
+            self.charge(budget);
+        }
+    }
+
+    /// Returns true if no more pairs are wanted.
     pub(crate) fn is_full(&self) -> bool {
         self.is_full
     }
@@ -186,7 +208,7 @@ impl Hits {
         rule: &Rule<'_>,
     ) {
         let candidates = self.expand(simd, &writer.blocks[..writer.len]);
-        self.vague += candidates as u64;
+        self.extra += candidates as u64 * (WORK_OF_VAGUE_TEST - 1);
         self.test(own, records, candidates, rule);
         writer.len = 0;
     }
@@ -262,12 +284,6 @@ impl Hits {
         self.handed_over + self.pairs.len() as u64
     }
 
-    /// Tests a box exactly against each of a run, and keeps the pairs that the rule allows.
-    pub(super) fn test_run(&mut self, one: &Record, run: &[Record], rule: &Rule<'_>) {
-        let from = self.test_part(one, run, self.pairs.len(), rule);
-        self.keep(from, rule);
-    }
-
     /// Tests a box exactly against each of a run. The pairs from `from` on were not filtered and counted yet. Keeps them if they are many,
     /// and returns the first one that is left.
     pub(super) fn test_part(
@@ -279,6 +295,7 @@ impl Hits {
     ) -> usize {
         for run in run.chunks(BATCH) {
             self.tests += run.len() as u64;
+            self.extra += run.len() as u64 * (WORK_OF_EXACT_TEST - 1);
             self.push_overlapping(one, run);
             if self.pairs.len() - from >= BATCH {
                 self.keep(from, rule);

@@ -3,22 +3,22 @@
 
 use super::Grid;
 use super::cells::{Cells, Window, query_of, steps_portable};
-use super::hits::{HIT_ROOM, HitWriter, Hits, Rule};
+use super::hits::{CHARGED_FROM, HIT_ROOM, HitWriter, Hits, Rule};
 use super::record::Record;
 use super::simd::{BLOCK, Simd, dispatch};
 use super::spacing::NeighbourScan;
 use crate::Aabb;
 use crate::parallel::run_with;
+use crate::policy::search::{WORK_OF_ROW, WORK_OF_RUNS};
 use std::ops::Range;
 
-/// Maximum number of boxes in a piece of work. Threads share smaller pieces, because each of a few boxes may meet many.
-const PIECE: usize = 16_384;
+/// Number of boxes in a piece of work. It does not follow the threads, because the work of a piece is charged to the budget.
+const PIECE: usize = 512;
 
 /// Number of oversize boxes in a piece of work.
 const OVERSIZE_PIECE: usize = 4;
 
-/// Boxes in cells, as they were built: every box lies in its cell. (A grid that was edited has tombstones, and cannot be searched.) Boxes
-/// of one set meet each other. Those of two sets lie in two grids of one plan, and no two boxes of a set meet.
+/// Boxes in cells. Boxes of one set meet each other. Those of two sets lie in two grids of one plan, and no two boxes of a set meet.
 #[derive(Clone, Copy)]
 pub(crate) struct Sorted<'a> {
     /// The grid whose boxes are searched for: of two, the one with fewer boxes. These may lie in their buckets only, see
@@ -42,11 +42,6 @@ impl<'a> Sorted<'a> {
         self.own.len + self.other.map_or(0, |other| other.len) + self.oversize_count()
     }
 
-    /// Returns the number of boxes that are searched for.
-    pub(crate) fn seekers(&self) -> usize {
-        self.own.len + self.oversize_count()
-    }
-
     /// Returns the number of oversize boxes.
     pub(crate) fn oversize_count(&self) -> usize {
         self.own.oversize.len() + self.other.map_or(0, |other| other.oversize.len())
@@ -65,15 +60,11 @@ impl<'a> Sorted<'a> {
     /// Finds all pairs, into the lists of as many threads as there are `hits`.
     pub(crate) fn search(&self, rule: &Rule<'_>, hits: &mut [Hits]) {
         let (len, oversize) = (self.own.len, self.oversize_count());
-        let wanted = if hits.len() == 1 { 1 } else { 8 * hits.len() };
-        let piece = len.div_ceil(wanted).clamp(1, PIECE);
-        let in_grid = len.div_ceil(piece);
+        let in_grid = len.div_ceil(PIECE);
         run_with(hits, in_grid + oversize.div_ceil(OVERSIZE_PIECE), |hits, i| {
-            if hits.is_full {
-                return;
-            }
             if i < in_grid {
-                return self.search_slots(i * piece..len.min((i + 1) * piece), rule, hits);
+                self.search_slots(i * PIECE..len.min((i + 1) * PIECE), rule, hits);
+                return hits.charge(rule.budget);
             }
             let first = (i - in_grid) * OVERSIZE_PIECE;
             (first..oversize.min(first + OVERSIZE_PIECE)).for_each(|i| self.search_oversize(i, rule, hits));
@@ -81,21 +72,27 @@ impl<'a> Sorted<'a> {
     }
 
     /// Finds the pairs of the boxes in some slots.
-    pub(super) fn search_slots(&self, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
-        dispatch!(search_piece, self, slots.clone(), rule, hits);
+    fn search_slots(&self, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
+        if !hits.is_full {
+            dispatch!(search_piece, self, slots.clone(), rule, hits);
+        }
     }
 
     /// Finds the pairs of an oversize box.
-    pub(super) fn search_oversize(&self, i: usize, rule: &Rule<'_>, hits: &mut Hits) {
+    fn search_oversize(&self, i: usize, rule: &Rule<'_>, hits: &mut Hits) {
+        if hits.is_full {
+            return;
+        }
         let (one, grid, others) = self.oversize(i);
         let mut from = hits.pairs.len();
         grid.reached_by(&one.aabb, |run| {
             let (first, end) = grid.slots(run);
-            hits.runs += 1;
+            hits.extra += WORK_OF_ROW;
             from = hits.test_part(one, &grid.records[first..end], from, rule);
         });
         from = hits.test_part(one, others, from, rule);
         hits.keep(from, rule);
+        hits.charge(rule.budget);
     }
 }
 
@@ -142,7 +139,7 @@ impl<S: Simd> Scan<'_, '_, S> {
     fn runs(&mut self, slots: Range<usize>) {
         let (dx, layer) = (self.cells.dims[0] as usize, (self.cells.dims[0] * self.cells.dims[1]) as usize);
         let Grid { starts, records, codes, .. } = self.grid;
-        self.hits.runs += 5 * slots.len() as u64;
+        self.writer.rows += slots.len() as u64 * WORK_OF_RUNS;
         for slot in slots {
             let key = records[slot].key as usize;
             // SAFETY: the ring of border cells is never a box's own, so `starts` has all keys below.
@@ -152,7 +149,7 @@ impl<S: Simd> Scan<'_, '_, S> {
             let runs = [(slot + 1, start(key + 2)), row(above), row(next - dx), row(next), row(next + dx)];
             // SAFETY: each begins at a start, or at `slot + 1`: at most the number of slots.
             unsafe { self.few(Seeker { slot, query: query_of(codes[slot]) }, runs) };
-            if self.hits.is_full {
+            if self.is_over() {
                 break;
             }
         }
@@ -210,10 +207,21 @@ impl<S: Simd> Scan<'_, '_, S> {
     }
 
     #[inline(always)]
-    fn finish(mut self) {
+    fn finish(&mut self) {
         let records = (&self.own.records[..], &self.grid.records[..]);
         self.hits.flush(self.simd, &mut self.writer, records, self.rule);
-        self.hits.tests += self.writer.tests;
+        self.hits.tests += std::mem::take(&mut self.writer.tests);
+        self.hits.extra += std::mem::take(&mut self.writer.rows);
+    }
+
+    /// Charges much work at once. Returns true if no more pairs are wanted.
+    #[inline(always)]
+    fn is_over(&mut self) -> bool {
+        if self.writer.tests + self.writer.rows > CHARGED_FROM {
+            self.finish();
+            self.hits.charge(self.rule.budget);
+        }
+        self.hits.is_full
     }
 
     /// Visits, for each box, the cells after its own in which the lower corner of an overlapping box can lie.
@@ -221,7 +229,7 @@ impl<S: Simd> Scan<'_, '_, S> {
     fn windows<const WRAPS: bool>(&mut self, slots: Range<usize>) {
         let cells = self.cells;
         for slot in slots {
-            if self.hits.is_full {
+            if self.is_over() {
                 break;
             }
             let record: &Record = &self.grid.records[slot];
@@ -253,7 +261,7 @@ impl<S: Simd> Scan<'_, '_, S> {
     fn across<const WRAPS: bool>(&mut self, slots: Range<usize>) {
         let cells = self.cells;
         for slot in slots {
-            if self.hits.is_full {
+            if self.is_over() {
                 break;
             }
             let (low, high) = self.simd.steps(&cells, &self.own.records[slot].aabb);
@@ -287,7 +295,7 @@ impl<S: Simd> Scan<'_, '_, S> {
             row(low[1], high[2], is_deeper),
             row(high[1], high[2], is_higher & is_deeper),
         ];
-        self.hits.runs += 4;
+        self.writer.rows += WORK_OF_RUNS;
         // SAFETY: each begins at a start: at most the number of slots.
         unsafe { self.few(one, runs) };
     }
@@ -295,8 +303,8 @@ impl<S: Simd> Scan<'_, '_, S> {
     /// Tests a row of cells.
     #[inline(always)]
     fn row(&mut self, one: Seeker, row: [KeyRun; 2]) {
+        self.writer.rows += WORK_OF_ROW;
         for run in row {
-            self.hits.runs += 1;
             self.slots(one, self.grid.slots(run));
         }
     }

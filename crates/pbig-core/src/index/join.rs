@@ -5,12 +5,11 @@
 
 use super::BoxIndex;
 use super::node::{LANES, NONE, next};
-use crate::grid::{Hits, Rule, Simd, dispatch, scattered};
+use crate::grid::{Hits, Rule, Simd, dispatch};
 use crate::parallel::run_with;
-use crate::policy::search;
+use crate::policy::search::WORK_OF_NODE;
 use crate::{Aabb, Pair};
 use std::ops::Range;
-use std::sync::atomic::AtomicU64;
 
 /// Number of leaves in a piece of work.
 const PIECE: usize = 64;
@@ -22,25 +21,6 @@ const BATCH: usize = 4096;
 const FEW_LANES: u32 = 3;
 
 impl BoxIndex {
-    /// Estimates the work of [`BoxIndex::find_pairs`] that overlaps do not pay for, from some leaves. Stops above `most`. `hits` are
-    /// scratch.
-    pub(crate) fn vain_work(&self, split: Option<u32>, most: u64, hits: &mut Hits) -> u64 {
-        let ((leaves, earliest), found) = (self.joined(split), AtomicU64::new(0));
-        let rule = &Rule::listing(None, &found);
-        let (last_leaves, step) = (self.last_leaves(), search::leaves_per_sampled(leaves));
-        let mut vain = 0;
-        for leaf in scattered(0..leaves as usize, step) {
-            hits.begin(0, 0);
-            let join = &mut Join { index: self, last_leaves: &last_leaves, earliest, rule, hits };
-            dispatch!(Join::meet_all, join, leaf..leaf + 1);
-            vain += search::in_vain(hits.tests + hits.runs, hits.overlaps) * step as u64;
-            if vain > most {
-                break;
-            }
-        }
-        vain
-    }
-
     /// Returns the number of leaves that are joined with others, and the first of these.
     fn joined(&self, split: Option<u32>) -> (u32, u32) {
         let Some(split) = split else { return (self.leaves, 0) };
@@ -91,7 +71,9 @@ impl Join<'_, '_> {
                 return;
             }
             join.meet(simd, leaf as u32, &mut waiting);
+            join.hits.charge_much(join.rule.budget);
         }
+        join.hits.charge(join.rule.budget);
     }
 
     /// Finds the pairs of a leaf's boxes with each other, and with those of later leaves, from the earliest on.
@@ -103,7 +85,7 @@ impl Join<'_, '_> {
         let mut from = self.hits.pairs.len();
         waiting.extend(index.root());
         while let Some(at) = waiting.pop() {
-            self.hits.runs += 1;
+            self.hits.extra += WORK_OF_NODE;
             if index.is_leaf(at) {
                 self.test(simd, leaf, at, &bounds);
                 // Boxes as large as the world meet all others.

@@ -45,7 +45,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// });
 /// assert_eq!(first, (2.5, Some(1)));
 /// ```
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct BoxIndex {
     /// Leaves first, then their parents, and so on up to the root; then loose leaves, which hold boxes that came since the sort.
     nodes: Vec<Node>,
@@ -70,7 +70,9 @@ pub struct BoxIndex {
     has_moved: bool,
     /// Nodes that queries have looked at since the last sort; not counted while no sort is wanted.
     looked_at: Count,
-    /// Nodes for queries to look at before a sort pays; none if no number of them is enough.
+    /// As `looked_at`, of look-ups: threads that query at once do not decide about an update.
+    looked_up: u64,
+    /// Nodes to look at before a sort pays; none if no number of them is enough.
     sort_after: Option<u64>,
     /// Buffers for few changed boxes: these in the order of places, and the nodes of a level above them.
     order: Vec<u64>,
@@ -82,10 +84,9 @@ pub struct BoxIndex {
 #[repr(align(64))]
 struct Count(AtomicU64);
 
-impl Clone for BoxIndex {
-    /// Returns an empty index, which its first [`BoxIndex::refresh`] fills.
+impl Clone for Count {
     fn clone(&self) -> Self {
-        Self::default()
+        Self(AtomicU64::new(self.0.load(Ordering::Relaxed)))
     }
 }
 
@@ -136,15 +137,27 @@ impl BoxIndex {
         walk::overlapping(simd, self, aabb, visit)
     }
 
+    /// Counts nodes that look-ups have looked at. If these were given up, the next ones begin with a sort. Returns false if the boxes are
+    /// as sorted, so that this would not help.
+    pub(crate) fn note_look_ups(&mut self, nodes: u64, is_given_up: bool) -> bool {
+        self.looked_up = if is_given_up { u64::MAX } else { self.looked_up.saturating_add(nodes) };
+        self.has_moved
+    }
+
     /// Counts nodes that a query has looked at, where they can lead to a sort. Threads may lose each other's counts: an atomic addition
     /// takes as long as a node.
     #[inline(always)]
-    pub(crate) fn note(&self, looked_at: u64) -> u64 {
+    fn note(&self, looked_at: u64) -> u64 {
         if self.sort_after.is_some() {
             let before = self.looked_at.0.load(Ordering::Relaxed);
             self.looked_at.0.store(before + looked_at, Ordering::Relaxed);
         }
         looked_at
+    }
+
+    /// Returns the number of boxes at the last layout.
+    pub(crate) fn len(&self) -> usize {
+        self.listed
     }
 
     /// Returns the leaves and the ids of their boxes, for pictures.

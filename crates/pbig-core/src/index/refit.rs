@@ -2,7 +2,7 @@
 
 use super::BoxIndex;
 use super::node::{LANES, NONE, Node, extent_sum};
-use super::sort::{Entry, sort};
+use super::sort::{Entry, Order, sort};
 use crate::Aabb;
 use crate::grid::{Simd, dispatch, prefetch};
 use crate::parallel::{SharedSlice, available_threads, run};
@@ -41,10 +41,11 @@ impl BoxIndex {
         present: impl Iterator<Item = u32> + Clone,
     ) -> usize {
         let read = self.read(boxes, changed, present.clone());
-        if !self.is_bad() {
+        if !self.wants_sort() && !self.has_many_loose() {
             return read;
         }
-        self.lay_out(boxes, present, self.has_earned_sort().then_some(u32::MAX));
+        let is_sorted = self.is_sorted || self.has_earned_sort();
+        self.lay_out(boxes, present, is_sorted.then_some(Order::SORTED));
         read + self.listed
     }
 
@@ -59,8 +60,9 @@ impl BoxIndex {
         if self.is_sorted {
             read = self.read(boxes, changed, present.clone());
         }
-        if !self.is_sorted || self.is_bad() {
-            self.sort_present(boxes, present);
+        let is_bad = self.sort_after.is_some_and(|nodes| self.looked_up >= nodes);
+        if !self.is_sorted || is_bad || self.has_many_loose() {
+            self.lay_out(boxes, present, Some(Order::ROOMY));
             read += self.listed;
         }
         read
@@ -80,30 +82,50 @@ impl BoxIndex {
         few.map_or(self.listed, <[u32]>::len)
     }
 
-    /// Returns true if the boxes should be laid out anew.
-    fn is_bad(&self) -> bool {
-        self.wants_sort() || self.loose().len() > policy::loose_leaves(self.leaves)
+    /// Returns true if the boxes should be laid out anew, because too many have no place in the tree.
+    fn has_many_loose(&self) -> bool {
+        self.loose().len() > policy::loose_leaves(self.leaves)
     }
 
-    /// Reads few boxes.
+    /// Reads few boxes. Those that came, and those that have jumped, get places near others.
     fn take(&mut self, boxes: &[Aabb], ids: &[u32]) {
+        let mut order = std::mem::take(&mut self.order);
+        order.clear();
         for &id in ids {
-            let has_place = self.places.get(id as usize).is_some_and(|place| *place != NONE);
-            if !has_place && boxes.get(id as usize).is_some_and(Aabb::is_valid) {
-                self.add(id, boxes);
+            let place = self.places.get(id as usize).copied().unwrap_or(NONE);
+            let aabb = boxes.get(id as usize).filter(|aabb| aabb.is_valid());
+            let stays = aabb.is_some_and(|aabb| self.is_near(place, aabb));
+            if place != NONE && !stays {
+                self.nodes[place as usize / LANES].children[place as usize % LANES] = NONE;
+                self.places[id as usize] = NONE;
+                order.push(word(place, NONE));
+            }
+            if let Some(aabb) = aabb {
+                if !stays {
+                    self.add(id, aabb);
+                }
+                order.push(word(self.places[id as usize], id));
             }
         }
-        let mut order = std::mem::take(&mut self.order);
-        self.in_order(ids, &mut order);
+        order.sort_unstable();
         dispatch!(Self::put_all, self, boxes, &order);
         self.order = order;
+    }
+
+    /// Returns true if a box is still near the place that it has: it meets the bounds of the node above its leaf.
+    fn is_near(&self, place: u32, aabb: &Aabb) -> bool {
+        if place == NONE {
+            return false;
+        }
+        let above = self.parents[place as usize / LANES];
+        above == NONE || self.bounds[above as usize / LANES].overlaps(aabb)
     }
 
     /// Writes ids in the order of their places: place and id in one word.
     pub(crate) fn in_order(&self, ids: &[u32], order: &mut Vec<u64>) {
         order.clear();
         let place = |id: u32| self.places.get(id as usize).copied().unwrap_or(NONE);
-        order.extend(ids.iter().map(|id| u64::from(place(*id)) << 32 | u64::from(*id)));
+        order.extend(ids.iter().map(|id| word(place(*id), *id)));
         order.sort_unstable();
     }
 
@@ -114,9 +136,11 @@ impl BoxIndex {
         nodes.clear();
         for word in order {
             let (place, id) = ((word >> 32) as u32, *word as u32);
-            if place != NONE {
+            let node = &mut index.nodes[place as usize / LANES];
+            // A lane that was left may have been taken since.
+            if node.children[place as usize % LANES] == id {
                 let aabb = boxes.get(id as usize).unwrap_or(&Aabb::NOWHERE);
-                index.nodes[place as usize / LANES].set(place as usize % LANES, aabb);
+                node.set(place as usize % LANES, aabb);
                 if nodes.last() != Some(&(place / LANES as u32)) {
                     nodes.push(place / LANES as u32);
                 }
@@ -189,12 +213,13 @@ impl BoxIndex {
 
     /// As [`BoxIndex::sort`]; no id but the `present` ones has a box.
     pub(crate) fn sort_present(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>) {
-        self.lay_out(boxes, present, Some(u32::MAX));
+        self.lay_out(boxes, present, Some(Order::SORTED));
     }
 
     /// Sorts the boxes; of two sets, ids from `split` on are the second, and no leaf has boxes of both.
     pub(crate) fn sort_sets(&mut self, boxes: &[Aabb], split: Option<u32>) {
-        self.lay_out(boxes, 0..boxes.len() as u32, Some(split.unwrap_or(u32::MAX)));
+        let split = split.unwrap_or(u32::MAX);
+        self.lay_out(boxes, 0..boxes.len() as u32, Some(Order { split, ..Order::SORTED }));
     }
 
     /// Reads all boxes.
@@ -206,14 +231,12 @@ impl BoxIndex {
         // After a peak, most leaves are empty.
         let full = self.bounds[..self.leaves as usize].iter().filter(|bounds| bounds.is_valid()).count();
         if policy::FULL_LEAVES_SHARE * full < self.leaves as usize {
-            return self.lay_out(boxes, present, self.is_sorted.then_some(u32::MAX));
+            return self.lay_out(boxes, present, self.is_sorted.then_some(Order::SORTED));
         }
         self.places.resize(boxes.len().max(self.places.len()), NONE);
-        for id in present {
-            if self.places[id as usize] == NONE && boxes[id as usize].is_valid() {
-                self.add(id, boxes);
-            }
-        }
+        let has_come = |id: &u32| self.places[*id as usize] == NONE && boxes[*id as usize].is_valid();
+        let came: Vec<u32> = present.filter(has_come).collect();
+        self.take(boxes, &came);
     }
 
     /// Reads the boxes of all leaves, then those of the other nodes, children first.
@@ -234,10 +257,13 @@ impl BoxIndex {
         self.grown += grown.map(usize::from).sum::<usize>();
     }
 
-    /// Appends a box that has no place to the loose leaves.
-    fn add(&mut self, id: u32, boxes: &[Aabb]) {
+    /// Gives a box a place near others, or in the loose leaves.
+    fn add(&mut self, id: u32, aabb: &Aabb) {
         if self.places.len() <= id as usize {
             self.places.resize(id as usize + 1, NONE);
+        }
+        if let Some(leaf) = self.leaf_with_room(aabb) {
+            return self.put(leaf, id, aabb);
         }
         let last = self.nodes.len().checked_sub(1).filter(|last| *last >= self.end as usize);
         let open = last.filter(|last| self.nodes[*last].children[LANES - 1] == NONE);
@@ -245,12 +271,40 @@ impl BoxIndex {
             self.push(Node::EMPTY);
             self.nodes.len() - 1
         });
-        let node = &mut self.nodes[at];
+        self.put(at, id, aabb);
+        self.bounds[at] = self.bounds[at].union(aabb);
+    }
+
+    /// Puts a box into the first free lane of a leaf. The bounds do not know it yet.
+    fn put(&mut self, leaf: usize, id: u32, aabb: &Aabb) {
+        let node = &mut self.nodes[leaf];
         let lane = node.children.iter().position(|child| *child == NONE).unwrap_or(LANES - 1);
         node.children[lane] = id;
-        node.set(lane, &boxes[id as usize]);
-        self.bounds[at] = self.bounds[at].union(&boxes[id as usize]);
-        self.places[id as usize] = (at * LANES + lane) as u32;
+        node.set(lane, aabb);
+        self.places[id as usize] = (leaf * LANES + lane) as u32;
+    }
+
+    /// Returns the leaf with a free lane that grows least with a box: from the root on, the child that grows least. There is none if that
+    /// leads to full leaves, or away from the box.
+    fn leaf_with_room(&self, aabb: &Aabb) -> Option<usize> {
+        let mut at = self.root()? as usize;
+        while !self.is_leaf(at as u32) {
+            if !self.bounds[at].overlaps(aabb) {
+                return None;
+            }
+            let children = self.nodes[at].children.iter().filter(|child| **child != NONE);
+            let with_room = children.map(|child| *child as usize).filter(|child| self.has_room(*child));
+            let growth = |child: &usize| {
+                extent_sum(&self.bounds[*child].union(aabb)) - extent_sum(&self.bounds[*child])
+            };
+            at = with_room.min_by(|one, other| growth(one).total_cmp(&growth(other)))?;
+        }
+        Some(at)
+    }
+
+    /// Returns true if a leaf has a free lane, and of every other node.
+    fn has_room(&self, node: usize) -> bool {
+        !self.is_leaf(node as u32) || self.nodes[node].children.contains(&NONE)
     }
 
     fn push(&mut self, node: Node) {
@@ -260,8 +314,8 @@ impl BoxIndex {
         self.extents.push(f32::INFINITY);
     }
 
-    /// Makes all nodes anew: in the order of ids, or with a `split` sorted as two sets, the first with the ids below it.
-    fn lay_out(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>, split: Option<u32>) {
+    /// Makes all nodes anew: in the order of ids, or sorted.
+    fn lay_out(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>, order: Option<Order>) {
         let all = present.map(|id| (id, &boxes[id as usize])).filter(|(_, aabb)| aabb.is_valid());
         let mut entries: Vec<Entry> = all.map(|(id, aabb)| Entry::new(id, aabb)).collect();
         self.drop_peak(entries.len());
@@ -273,8 +327,10 @@ impl BoxIndex {
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         self.listed = entries.len();
         let all = 0..entries.len();
-        let classes = split.map_or_else(|| Vec::from([all]), |split| sort(&mut entries, split));
-        let classes: Vec<_> = classes.into_iter().map(|class| self.push_leaves(&entries[class])).collect();
+        let classes = order.map_or_else(|| Vec::from([all]), |order| sort(&mut entries, order));
+        let leaf = order.unwrap_or(Order::SORTED).leaf;
+        let classes = classes.into_iter().map(|class| self.push_leaves(&entries[class], leaf));
+        let classes: Vec<_> = classes.collect();
         self.leaves = self.nodes.len() as u32;
         let mut roots: Vec<u32> =
             classes.into_iter().flat_map(|class| self.push_parents(class.collect())).collect();
@@ -284,9 +340,10 @@ impl BoxIndex {
         self.known = boxes.len();
         self.read_all(boxes);
         self.extents = self.bounds.iter().map(extent_sum).collect();
-        (self.grown, self.is_sorted) = (0, split.is_some());
+        (self.grown, self.is_sorted) = (0, order.is_some());
         if self.is_sorted {
             *self.looked_at.0.get_mut() = 0;
+            self.looked_up = 0;
             self.has_moved = false;
         }
         self.plan_sort();
@@ -299,12 +356,12 @@ impl BoxIndex {
         }
     }
 
-    /// Makes the leaves of a class; returns their numbers.
-    fn push_leaves(&mut self, class: &[Entry]) -> std::ops::Range<u32> {
+    /// Makes the leaves of a class, of so many boxes each; returns their numbers.
+    fn push_leaves(&mut self, class: &[Entry], leaf: usize) -> std::ops::Range<u32> {
         let first = self.nodes.len() as u32;
-        for eight in class.chunks(LANES) {
+        for boxes in class.chunks(leaf) {
             let mut node = Node::EMPTY;
-            for (lane, entry) in eight.iter().enumerate() {
+            for (lane, entry) in boxes.iter().enumerate() {
                 node.children[lane] = entry.id;
                 self.places[entry.id as usize] = (self.nodes.len() * LANES + lane) as u32;
             }
@@ -329,6 +386,11 @@ impl BoxIndex {
         }
         level
     }
+}
+
+/// Returns a place and an id in one word, in the order of places.
+fn word(place: u32, id: u32) -> u64 {
+    u64::from(place) << 32 | u64::from(id)
 }
 
 /// Reads the boxes of leaves, and the boxes around them.

@@ -2,7 +2,6 @@
 
 use super::node::LANES;
 use crate::Aabb;
-use crate::grid::scattered;
 use crate::parallel::{SharedSlice, available_threads, both, run};
 use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
@@ -16,6 +15,22 @@ const MAX_SAMPLED: usize = 64;
 
 /// Minimum number of sampled boxes around a part that tell which are around its halves.
 const MIN_SAMPLED: usize = 16;
+
+/// The order of the boxes in a tree.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Order {
+    /// The first id of the second of two sets: no leaf has boxes of both. Above all ids if there is one set.
+    pub(super) split: u32,
+    /// Boxes in a leaf.
+    pub(super) leaf: usize,
+}
+
+impl Order {
+    /// One set in full leaves.
+    pub(super) const SORTED: Self = Self { split: u32::MAX, leaf: LANES };
+    /// One set, and in each leaf room for a box that comes.
+    pub(super) const ROOMY: Self = Self { leaf: LANES - 1, ..Self::SORTED };
+}
 
 /// A box as the sort reads it: 20 bytes, as it is moved once for each level of the tree.
 #[derive(Clone, Copy, Debug)]
@@ -61,10 +76,10 @@ fn with_exponent(exponent: u8) -> f64 {
     f64::from(f32::from_bits(u32::from(exponent.min(254)) << 23))
 }
 
-/// Sorts boxes by class, and within a class by place. Returns the classes. Boxes with ids from `split` on are another set: no
-/// class has boxes of both. But the cuts of a set take the boxes of the other set into account, so that few of these lie across a
+/// Sorts boxes by class, and within a class by place. Returns the classes. Two sets have
+/// classes of their own. But the cuts of a set take the boxes of the other set into account, so that few of these lie across a
 /// cut.
-pub(super) fn sort(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
+pub(super) fn sort(entries: &mut [Entry], Order { split, leaf }: Order) -> Vec<Range<usize>> {
     let are_alike = |a: &Entry, b: &Entry| a.class(split) == b.class(split);
     if !entries.windows(2).all(|two| are_alike(&two[0], &two[1])) {
         entries.sort_unstable_by_key(|entry| entry.class(split));
@@ -82,35 +97,35 @@ pub(super) fn sort(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
         let class = unsafe { shared.part(classes[at].clone()) };
         let may_meet = |sample: &Sampled| sample.entry.may_meet(&class[0], split);
         let samples = samples.iter().copied().filter(may_meet).collect();
-        sort_by_place(class, &Others { samples, is_few: false });
+        sort_by_place(class, leaf, &Others { samples, is_few: false });
     });
     classes
 }
 
 /// Halves a list again and again at the median of its best axis. Medians are ranks, so that a box far away costs the others
 /// nothing. The cuts lie between whole nodes of the level in question. `others` stand for boxes of other classes around these.
-fn sort_by_place(entries: &mut [Entry], others: &Others) {
-    if entries.len() <= LANES {
+fn sort_by_place(entries: &mut [Entry], leaf: usize, others: &Others) {
+    if entries.len() <= leaf {
         return;
     }
     let part = Measure::of(entries);
     let mut near = others.near(&part);
-    let (axis, middle) = (best_axis(&part, &near.samples), cut(entries.len()));
+    let (axis, middle) = (best_axis(&part, &near.samples), cut(entries.len(), leaf));
     near.halve(&part, axis);
     let is_few = entries.len() < PARALLEL_FROM_BOXES;
     entries.select_nth_unstable_by(middle, |a, b| a.center[axis].total_cmp(&b.center[axis]));
     let (first, rest) = entries.split_at_mut(middle);
     if is_few {
-        sort_by_place(first, &near);
-        sort_by_place(rest, &near);
+        sort_by_place(first, leaf, &near);
+        sort_by_place(rest, leaf, &near);
     } else {
-        both(|| sort_by_place(first, &near), || sort_by_place(rest, &near));
+        both(|| sort_by_place(first, leaf, &near), || sort_by_place(rest, leaf, &near));
     }
 }
 
 /// Returns a multiple of the boxes in a child, about half of all.
-fn cut(len: usize) -> usize {
-    let mut child = LANES;
+fn cut(len: usize, leaf: usize) -> usize {
+    let mut child = leaf;
     while child * LANES < len {
         child *= LANES;
     }
@@ -155,8 +170,19 @@ impl Sampled {
     fn of(class: &[Entry]) -> impl Iterator<Item = Self> {
         let step = class.len().div_ceil(MAX_SAMPLED);
         let boxes = class.len() as f64 / class.len().div_ceil(step) as f64;
-        scattered(0..class.len(), step).map(move |i| Self { entry: class[i], boxes })
+        scattered(class.len(), step).map(move |i| Self { entry: class[i], boxes })
     }
+}
+
+/// Yields a number of every `step` below an end, each somewhere else in its part: a pattern in the order of the boxes cannot bias a
+/// sample.
+fn scattered(end: usize, step: usize) -> impl Iterator<Item = usize> {
+    const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+    let at = move |first: usize| {
+        let hash = (first as u64).wrapping_mul(GOLDEN) >> 32;
+        first + ((hash * step as u64) >> 32) as usize
+    };
+    (0..end).step_by(step).map(at).filter(move |at| *at < end)
 }
 
 /// Boxes of other classes that may meet those of a part.

@@ -416,22 +416,6 @@ pub(crate) fn needles(n: usize) -> Vec<Aabb> {
 }
 
 #[test]
-fn the_work_of_a_join_is_estimated_from_some_leaves() {
-    let boxes = needles(20_000);
-    let (mut index, found, mut hits) = (BoxIndex::default(), AtomicU64::new(0), [Hits::default()]);
-    let rule = Rule::listing(None, &found);
-    for split in [None, Some(10_000)] {
-        index.sort_sets(&boxes, split);
-        let estimated = index.vain_work(split, u64::MAX, &mut hits[0]);
-        hits[0].begin(0, 0);
-        index.find_pairs(split, &rule, &mut hits);
-        let work = hits[0].tests + hits[0].runs;
-        assert!(estimated.abs_diff(work) < work / 4, "{estimated} for {work}");
-        assert!(index.vain_work(split, work / 4, &mut hits[0]) < work / 2, "stops soon");
-    }
-}
-
-#[test]
 fn a_box_without_bounds_meets_no_removed_one() {
     let unit = Aabb::new([0.0; 3], [1.0; 3]);
     let mut index = BoxIndex::default();

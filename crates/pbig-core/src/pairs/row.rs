@@ -37,7 +37,7 @@ pub(super) fn sort_into(
 
 /// Sorts a list that mostly has few ids.
 #[inline(always)]
-pub(crate) fn sort_few(simd: impl Simd, ids: &mut Vec<u32>) {
+pub(crate) fn sort_few(simd: impl Simd, ids: &mut [u32]) {
     let len = ids.len();
     if len > SHORT {
         return ids.sort_unstable();

@@ -23,6 +23,8 @@ pub(super) enum Fault {
     Inverted,
     /// It counts more valid boxes than there are boxes.
     MoreThanAll,
+    /// It counts no valid boxes.
+    CountsNone,
     /// It leaves out half of the pairs.
     TooFew,
     /// It adds pairs of boxes that are apart.
@@ -64,6 +66,10 @@ impl Double {
             Fault::BeyondTheLast => found.pairs.push(Pair { a: 0, b: n }),
             Fault::Inverted => found.pairs.push(Pair { a: n - 1, b: 0 }),
             Fault::MoreThanAll => found.valid = n + 1,
+            Fault::CountsNone => {
+                found.valid = 0;
+                found.pairs.reverse();
+            }
             Fault::TooFew => found.pairs.retain(|pair| (pair.a + pair.b).is_multiple_of(2)),
             Fault::TooMany => found.pairs.extend(some_pairs(boxes).step_by(4)),
             _ => {}
