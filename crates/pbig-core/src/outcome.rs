@@ -23,8 +23,6 @@ pub(crate) struct Outcome {
     pub(crate) work: u64,
     pub(crate) plan: Plan,
     pub(crate) stages: StageTimes,
-    /// True if the next call may do without giving up, although this one gave up.
-    pub(crate) may_try_again: bool,
     /// True if the engine has replaced the kept pairs. Otherwise the events have to be applied to them.
     pub(crate) has_replaced_kept: bool,
     /// The report on the device that did the work.

@@ -29,9 +29,12 @@ impl LookUp {
     /// Brings the tree up to date, and leaves the events of an update in the task. Gives up if it takes too much work.
     pub(super) fn run(&mut self, task: &mut Task<'_>, tree: &mut Tree) -> Outcome {
         let (world, mut clock, mut outcome) = (task.world, Clock::start(), Outcome::default());
-        let (index, read) = {
+        let followed = {
             stage!("map");
             tree.follow(world)
+        };
+        let Some((index, read)) = followed else {
+            return Outcome { work: world.changed.len() as u64, ..outcome };
         };
         index.in_order(&world.changed, &mut self.order);
         task.kept.make_backward();
@@ -50,7 +53,7 @@ impl LookUp {
         outcome.work = read as u64 + made + nodes + met;
         outcome.plan = Plan { algorithm: Algorithm::LookUp, boxes: world.valid, ..Plan::default() };
         outcome.end = if budget.is_over() { End::GivenUp } else { End::Done };
-        outcome.may_try_again = tree.note_look_ups(nodes, budget.is_over());
+        tree.note_look_ups(nodes, budget.is_over());
         outcome
     }
 

@@ -4,6 +4,7 @@
 use super::world::World;
 use crate::BoxIndex;
 use crate::parallel::alone;
+use crate::policy;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
@@ -110,20 +111,30 @@ impl Tree {
         Fresh::new(index, changed)
     }
 
-    /// Makes the tree fresh, with its boxes sorted, for look-ups of the changed ones. Returns it, and how many boxes were read.
-    pub(super) fn follow(&mut self, world: &World) -> (&BoxIndex, usize) {
+    /// Makes the tree fresh, with its boxes sorted, for look-ups of the changed ones. Returns it, and how many boxes were read; none, and
+    /// leaves the tree as it is, if too many boxes came or have jumped.
+    pub(super) fn follow(&mut self, world: &World) -> Option<(&BoxIndex, usize)> {
         self.make_stale();
-        let Stale { mut index, mut changed, knows_changes } = std::mem::take(self.stale_mut());
-        changed.extend_from_slice(&world.changed);
-        let known = knows_changes.then_some(&changed[..]);
-        let read = index.follow(&world.boxes, known, world.present.iter());
+        let stale = self.stale_mut();
+        let before = stale.changed.len();
+        stale.changed.extend_from_slice(&world.changed);
+        let known = stale.knows_changes.then_some(&stale.changed[..]);
+        let arrivals = known.map_or(0, |changed| stale.index.arrivals(&world.boxes, changed));
+        if !policy::may_place(world.present.len(), arrivals) {
+            stale.changed.truncate(before);
+            return None;
+        }
+        let read = stale.index.follow(&world.boxes, known, world.present.iter());
+        let Stale { index, changed, .. } = std::mem::take(stale);
         let fresh = Fresh::new(index, changed);
-        (&self.fresh.get_or_init(|| fresh).index, read)
+        Some((&self.fresh.get_or_init(|| fresh).index, read))
     }
 
-    /// Notes how many nodes the look-ups have looked at. Returns true if they may take less work next time, although they were given up.
-    pub(super) fn note_look_ups(&mut self, nodes: u64, is_given_up: bool) -> bool {
-        self.fresh.get_mut().is_some_and(|fresh| fresh.index.note_look_ups(nodes, is_given_up))
+    /// Notes how many nodes the look-ups have looked at, and whether they were given up.
+    pub(super) fn note_look_ups(&mut self, nodes: u64, is_given_up: bool) {
+        if let Some(fresh) = self.fresh.get_mut() {
+            fresh.index.note_look_ups(nodes, is_given_up);
+        }
     }
 
     /// Takes over a tree that was sorted just now from all boxes. The one so far is left in its place, for its memory.

@@ -69,7 +69,7 @@ impl BroadPhase {
         }
         if self.may_look_up(changed) {
             let outcome = self.run(|parts, task, tree| parts.look_up.run(task, tree));
-            self.given_up.note(outcome.end == End::GivenUp && !outcome.may_try_again, changed);
+            self.given_up.note(outcome.end == End::GivenUp, changed);
             if self.take(outcome)? {
                 return Ok(());
             }

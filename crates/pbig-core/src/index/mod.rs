@@ -19,6 +19,7 @@ pub(crate) mod tests;
 mod walk;
 
 use crate::grid::{Simd, dispatch};
+use crate::policy::index as policy;
 use crate::{Aabb, OccupiedCell};
 use node::{LANES, Node};
 use query::Cast;
@@ -56,6 +57,8 @@ pub struct BoxIndex {
     parents: Vec<u32>,
     /// By node: the box around its boxes.
     bounds: Vec<Aabb>,
+    /// By node: free lanes of a leaf; 1 for any other.
+    room: Vec<u8>,
     /// By node: the sum of its extents at the last sort; infinite once it has grown past twice that.
     extents: Vec<f32>,
     grown: usize,
@@ -137,11 +140,9 @@ impl BoxIndex {
         walk::overlapping(simd, self, aabb, visit)
     }
 
-    /// Counts nodes that look-ups have looked at. If these were given up, the next ones begin with a sort. Returns false if the boxes are
-    /// as sorted, so that this would not help.
-    pub(crate) fn note_look_ups(&mut self, nodes: u64, is_given_up: bool) -> bool {
-        self.looked_up = if is_given_up { u64::MAX } else { self.looked_up.saturating_add(nodes) };
-        self.has_moved
+    /// Counts nodes that look-ups have looked at. A search after them took as long as some more.
+    pub(crate) fn note_look_ups(&mut self, nodes: u64, is_given_up: bool) {
+        self.looked_up += nodes + if is_given_up { policy::nodes_of_search(self.listed) } else { 0 };
     }
 
     /// Counts nodes that a query has looked at, where they can lead to a sort. Threads may lose each other's counts: an atomic addition

@@ -55,6 +55,14 @@ impl Node {
         aabb
     }
 
+    /// Returns by how much the sum of the extents in a lane grows with a box.
+    #[inline(always)]
+    pub(super) fn growth(&self, lane: usize, aabb: &Aabb) -> f32 {
+        let below = |k: usize| (self.boxes[k][lane] - aabb.min[k]).max(0.0);
+        let above = |k: usize| (aabb.max[k] - self.boxes[k + 3][lane]).max(0.0);
+        (0..3).map(|k| below(k) + above(k)).sum()
+    }
+
     /// Returns true if a lane has a box.
     #[inline(always)]
     pub(super) fn has(&self, lane: usize) -> bool {

@@ -87,6 +87,14 @@ impl BoxIndex {
         self.loose().len() > policy::loose_leaves(self.leaves)
     }
 
+    /// Returns how many of some boxes came or have jumped: these need new places.
+    pub(crate) fn arrivals(&self, boxes: &[Aabb], ids: &[u32]) -> usize {
+        let place = |id: u32| self.places.get(id as usize).copied().unwrap_or(NONE);
+        let aabb = |id: u32| boxes.get(id as usize).filter(|aabb| aabb.is_valid());
+        let has_arrived = |id: &&u32| aabb(**id).is_some_and(|aabb| !self.is_near(place(**id), aabb));
+        if self.is_sorted { ids.iter().filter(has_arrived).count() } else { 0 }
+    }
+
     /// Reads few boxes. Those that came, and those that have jumped, get places near others.
     fn take(&mut self, boxes: &[Aabb], ids: &[u32]) {
         let mut order = std::mem::take(&mut self.order);
@@ -96,7 +104,7 @@ impl BoxIndex {
             let aabb = boxes.get(id as usize).filter(|aabb| aabb.is_valid());
             let stays = aabb.is_some_and(|aabb| self.is_near(place, aabb));
             if place != NONE && !stays {
-                self.nodes[place as usize / LANES].children[place as usize % LANES] = NONE;
+                self.leave(place);
                 self.places[id as usize] = NONE;
                 order.push(word(place, NONE));
             }
@@ -110,6 +118,13 @@ impl BoxIndex {
         order.sort_unstable();
         dispatch!(Self::put_all, self, boxes, &order);
         self.order = order;
+    }
+
+    /// Frees a lane. Its box is still there.
+    fn leave(&mut self, place: u32) {
+        let leaf = place as usize / LANES;
+        self.nodes[leaf].children[place as usize % LANES] = NONE;
+        self.room[leaf] += 1;
     }
 
     /// Returns true if a box is still near the place that it has: it meets the bounds of the node above its leaf.
@@ -266,7 +281,7 @@ impl BoxIndex {
             return self.put(leaf, id, aabb);
         }
         let last = self.nodes.len().checked_sub(1).filter(|last| *last >= self.end as usize);
-        let open = last.filter(|last| self.nodes[*last].children[LANES - 1] == NONE);
+        let open = last.filter(|last| self.room[*last] > 0);
         let at = open.unwrap_or_else(|| {
             self.push(Node::EMPTY);
             self.nodes.len() - 1
@@ -281,33 +296,30 @@ impl BoxIndex {
         let lane = node.children.iter().position(|child| *child == NONE).unwrap_or(LANES - 1);
         node.children[lane] = id;
         node.set(lane, aabb);
+        self.room[leaf] -= 1;
         self.places[id as usize] = (leaf * LANES + lane) as u32;
     }
 
     /// Returns the leaf with a free lane that grows least with a box: from the root on, the child that grows least. There is none if that
-    /// leads to full leaves, or away from the box.
+    /// leads to full leaves, or if the leaf would become larger than the node above it.
     fn leaf_with_room(&self, aabb: &Aabb) -> Option<usize> {
-        let mut at = self.root()? as usize;
+        let (mut above, mut at) = (None, self.root()? as usize);
         while !self.is_leaf(at as u32) {
-            if !self.bounds[at].overlaps(aabb) {
-                return None;
-            }
-            let children = self.nodes[at].children.iter().filter(|child| **child != NONE);
-            let with_room = children.map(|child| *child as usize).filter(|child| self.has_room(*child));
-            let growth = |child: &usize| {
-                extent_sum(&self.bounds[*child].union(aabb)) - extent_sum(&self.bounds[*child])
-            };
-            at = with_room.min_by(|one, other| growth(one).total_cmp(&growth(other)))?;
+            let node = &self.nodes[at];
+            let has_room =
+                |lane: &usize| node.children[*lane] != NONE && self.room[node.children[*lane] as usize] > 0;
+            let growth = |lane: &usize| node.growth(*lane, aabb);
+            let lane =
+                (0..LANES).filter(has_room).min_by(|one, other| growth(one).total_cmp(&growth(other)))?;
+            (above, at) = (Some(at), node.children[lane] as usize);
         }
-        Some(at)
-    }
-
-    /// Returns true if a leaf has a free lane, and of every other node.
-    fn has_room(&self, node: usize) -> bool {
-        !self.is_leaf(node as u32) || self.nodes[node].children.contains(&NONE)
+        let extent = extent_sum(&self.bounds[at].union(aabb));
+        let is_small = above.is_none_or(|above| extent <= policy::GROWN_TO * extent_sum(&self.bounds[above]));
+        (is_small && self.room[at] > 0).then_some(at)
     }
 
     fn push(&mut self, node: Node) {
+        self.room.push(node.children.iter().map(|child| u8::from(*child == NONE)).sum());
         self.nodes.push(node);
         self.parents.push(NONE);
         self.bounds.push(Aabb::NOWHERE);
@@ -321,6 +333,7 @@ impl BoxIndex {
         self.drop_peak(entries.len());
         self.forget_places();
         self.nodes.clear();
+        self.room.clear();
         self.parents.clear();
         self.bounds.clear();
         self.extents.clear();
@@ -381,6 +394,8 @@ impl BoxIndex {
                     self.parents[*child as usize] = (self.nodes.len() * LANES + lane) as u32;
                 }
                 self.push(node);
+                // Below it there may be some.
+                self.room.iter_mut().next_back().into_iter().for_each(|room| *room = 1);
             }
             level = (first..self.nodes.len() as u32).collect();
         }

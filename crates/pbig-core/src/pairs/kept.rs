@@ -4,6 +4,8 @@ use super::groups::Span;
 use crate::Pair;
 use crate::grid::prefetch;
 use crate::memory::{Scratch, ShrinkingVec};
+use crate::parallel::{SharedSlice, available_threads, piece_range, run};
+use crate::policy::PARALLEL_FROM_BOXES;
 use std::sync::OnceLock;
 
 /// Minimum room of a row that has outgrown its place.
@@ -188,6 +190,7 @@ impl Kept {
         self.forward.row(pair.a).binary_search(&pair.b).is_ok()
     }
 
+    /// Returns the rows of `a`, by `b`. Each of several threads reads all pairs, and writes the rows of its part of the ids.
     fn reversed(&self) -> Rows {
         let mut spans = vec![Span::default(); self.lower.len()];
         let mut next = 0;
@@ -197,11 +200,23 @@ impl Kept {
         }
         let mut pool = ShrinkingVec::default();
         pool.resize(next as usize, 0);
-        for pair in self.iter() {
-            let span = &mut spans[pair.b as usize];
-            pool[span.range().end] = pair.a;
-            span.len += 1;
-        }
+        let pieces = if self.len < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
+        let (ids, starts) = (spans.len(), SharedSlice::new(&mut spans));
+        let all = SharedSlice::new(&mut pool);
+        run(pieces, pieces, |_, piece| {
+            let own = piece_range(ids, piece, pieces);
+            // SAFETY: each piece has its own ids, and their rows follow each other.
+            let spans = unsafe { starts.part(own.clone()) };
+            let Some(first) = spans.first().map(|span| span.start as usize) else { return };
+            let places: usize = self.lower[own.clone()].iter().map(|len| *len as usize).sum();
+            // SAFETY: as above.
+            let pool = unsafe { all.part(first..first + places) };
+            for pair in self.iter().filter(|pair| own.contains(&(pair.b as usize))) {
+                let span = &mut spans[pair.b as usize - own.start];
+                pool[span.range().end - first] = pair.a;
+                span.len += 1;
+            }
+        });
         Rows { spans, pool }
     }
 

@@ -1,8 +1,8 @@
 //! The choice of how an update is made: changed boxes are looked up, or all boxes are searched.
 
-/// Maximum share of changed boxes for look-ups, as one in this number. Measured: from 1000 to 100,000 boxes, look-ups of one box in
-/// ten take half to nine tenths of the time of a search.
-const LOOK_UP_TO_ONE_IN: usize = 8;
+/// Maximum share of changed boxes for look-ups, as one in this number, up to some numbers of boxes and beyond. Measured: with more,
+/// look-ups take longer than a search of dense boxes.
+const LOOK_UP_TO_ONE_IN: [(usize, usize); 3] = [(512, 2), (16_384, 5), (usize::MAX, 8)];
 
 /// Minimum number of boxes for look-ups: all pairs of fewer are tested sooner than a tree is up to date.
 const LOOK_UP_FROM_BOXES: usize = 16;
@@ -18,16 +18,29 @@ const LIST_UP_TO_ONE_IN: usize = 2;
 /// Maximum number of searches in a row after look-ups that were given up.
 const MAX_SEARCHES: u32 = 64;
 
+/// Maximum share of boxes that came or have jumped, as one in this number: a place takes as long as two look-ups.
+const PLACE_ONE_IN: usize = 32;
+
+/// Smaller worlds may take as much work as one of this size.
+const SMALL_WORLD: usize = 4096;
+
 /// Minimum number of changed boxes for look-ups on several threads.
 pub(crate) const PARALLEL_FROM_CHANGES: usize = 1024;
 
 /// Returns true if an update looks up the changed boxes.
 pub(crate) fn may_look_up(boxes: usize, changed: usize) -> bool {
-    boxes >= LOOK_UP_FROM_BOXES && changed * LOOK_UP_TO_ONE_IN <= boxes
+    let one_in = |&&(up_to, _): &&(usize, usize)| boxes <= up_to;
+    let share = LOOK_UP_TO_ONE_IN.iter().find(one_in).map_or(boxes, |(_, share)| *share);
+    boxes >= LOOK_UP_FROM_BOXES && changed * share <= boxes
 }
 
-/// Look-ups that were given up because they took too much work. The next updates with as many changes search at once: one
-/// after the first, twice as many after each further one, until look-ups are not given up.
+/// Returns true if so many boxes that came or have jumped get places in the tree.
+pub(crate) fn may_place(boxes: usize, arrivals: usize) -> bool {
+    arrivals * PLACE_ONE_IN <= boxes.max(SMALL_WORLD)
+}
+
+/// A way that was given up because it took too much work. The next updates with as many changes go another way at once: one
+/// after the first, twice as many after each further one, and half as many after each that was not given up.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct GivenUp {
     /// Number of changed boxes of the last update that was given up.
@@ -52,14 +65,14 @@ impl GivenUp {
             let searches = (2 * self.searches).clamp(1, MAX_SEARCHES);
             *self = Self { changed, searches, left: searches };
         } else {
-            *self = Self::default();
+            self.searches /= 2;
         }
     }
 }
 
 /// Returns the maximum number of nodes for look-ups: 5 ns each, while a search sorts and joins a box in about 150 ns.
 pub(crate) fn look_up_to_nodes(boxes: usize) -> u64 {
-    LOOK_UP_TO_NODES_PER_BOX * boxes as u64
+    LOOK_UP_TO_NODES_PER_BOX * boxes.max(SMALL_WORLD) as u64
 }
 
 /// Returns true if a search lists the present boxes first: after a peak it does not look at all ids.
@@ -73,9 +86,11 @@ mod tests {
 
     #[test]
     fn few_changes_are_looked_up() {
-        assert!(may_look_up(800, 100) && !may_look_up(800, 101));
+        assert!(may_look_up(1000, 200) && !may_look_up(1000, 201));
+        assert!(may_look_up(500, 250) && !may_look_up(500, 251));
+        assert!(may_look_up(80_000, 10_000) && !may_look_up(80_000, 10_001));
         assert!(may_look_up(16, 1) && !may_look_up(15, 1));
-        assert_eq!(look_up_to_nodes(1000), 6000);
+        assert_eq!(look_up_to_nodes(10_000), 60_000);
     }
 
     #[test]
@@ -92,7 +107,8 @@ mod tests {
             (0..).find(|_| !given_up.forbids(100))
         };
         assert_eq!([(); 8].map(|()| searches()), [1, 2, 4, 8, 16, 32, 64, 64].map(Some));
-        given_up.note(false, 100);
-        assert!(!given_up.forbids(100));
+        (0..7).for_each(|_| given_up.note(false, 100));
+        given_up.note(true, 100);
+        assert!(given_up.forbids(100) && !given_up.forbids(100));
     }
 }

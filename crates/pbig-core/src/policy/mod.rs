@@ -11,13 +11,15 @@ pub(crate) mod search;
 
 pub use backend::NoDevice;
 pub(crate) use backend::{Choice, Work, choose_backend};
-pub(crate) use engine::{GivenUp, PARALLEL_FROM_CHANGES, is_listed, look_up_to_nodes, may_look_up};
+pub(crate) use engine::{
+    GivenUp, PARALLEL_FROM_CHANGES, is_listed, look_up_to_nodes, may_look_up, may_place,
+};
 
 /// Minimum number of boxes for a search on several threads. Waking a thread takes about as long as 16,384 boxes take alone.
 pub(crate) const PARALLEL_FROM_BOXES: usize = 16_384;
 
 /// Maximum number of boxes for a test of every pair, eight at a time: a grid takes longer.
-pub(crate) const BRUTE_FORCE_UP_TO_BOXES: usize = 200;
+pub(crate) const BRUTE_FORCE_UP_TO_BOXES: usize = 300;
 
 /// Wanted number of boxes in a cell, where density and not size decides about cells.
 pub(crate) const BOXES_PER_CELL: f64 = 0.5;
