@@ -294,3 +294,52 @@ fn look_ups_given_up_cost_at_most_64_tests_a_box() {
     assert!(update > search + 6 * u64::from(n), "{update}: no look-up was given up");
     assert!(update <= search + 64 * u64::from(n), "{update}, and {search} in a search");
 }
+
+/// Known and new ids, ids that are left alone, changed filters, boxes that become invalid, and a closure that panics.
+#[test]
+fn many_boxes_set_on_threads_are_those_set_one_by_one() {
+    let n = 40_000;
+    let place = |id: u32, round: u32| {
+        let at = [id % 40, id / 40 % 40, id / 1600].map(|x| x as f32 * 1.1);
+        let by = if (id + round).is_multiple_of(3) { 0.3 * round as f32 } else { 0.0 };
+        let is_valid = !(id + round).is_multiple_of(97);
+        let aabb = if is_valid { Aabb::from_center(at.map(|x| x + by), [0.5; 3]) } else { Aabb::NOWHERE };
+        let body = if round > 1 && id.is_multiple_of(5) { id / 2 } else { ProxyFilter::ALL.body };
+        (!(id * 7 + round).is_multiple_of(11)).then_some((aabb, ProxyFilter { body, ..ProxyFilter::ALL }))
+    };
+    let through_rounds = || {
+        let (mut many, mut single) = (BroadPhase::default(), BroadPhase::default());
+        for round in 0..5 {
+            let ids: Vec<u32> = (0..n).filter(|id| round > 2 || id % 4 > round).collect();
+            assert_eq!(many.set_many(&ids, |id| place(id, round)), Ok(()));
+            let set = ids.iter().filter_map(|id| place(*id, round).map(|(aabb, filter)| (*id, aabb, filter)));
+            set.for_each(|(id, aabb, filter)| single.set(id, aabb, filter).unwrap());
+            let mut changes = [many.changes().to_vec(), single.changes().to_vec()];
+            changes.iter_mut().for_each(|changes| changes.sort_unstable());
+            assert_eq!(changes[0], changes[1], "round {round}");
+            assert_eq!(many.update(), single.update(), "round {round}");
+            assert_eq!(many.report().invalid, single.report().invalid, "round {round}");
+        }
+        many
+    };
+    for threads in [1, 2, 4] {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
+            let (mut many, ids) = (through_rounds(), (0..n).collect::<Vec<u32>>());
+            let planted = |id: u32| if id == n - 5 { panic!("planted") } else { place(id, 7) };
+            let panics = std::panic::AssertUnwindSafe(|| many.set_many(&ids, planted));
+            assert!(std::panic::catch_unwind(panics).is_err());
+            // What was set before is not lost.
+            many.update().unwrap();
+            let filters: Vec<_> =
+                ids.iter().map(|id| many.filter(*id).copied().unwrap_or_default()).collect();
+            let mut finder = crate::Finder::default();
+            let wanted = finder.find_filtered(many.fat_aabbs(), &filters).unwrap();
+            assert!(many.pairs().eq(wanted.iter().copied()), "{threads} threads");
+        });
+    }
+    let ids: Vec<u32> = (0..20_000).chain([1 << 28]).collect();
+    let mut broad_phase = BroadPhase::default();
+    let far = broad_phase.set_many(&ids, |id| place(id, 0));
+    assert!(matches!(far, Err(crate::Error::TooManyBoxes { .. })), "{far:?}");
+    assert!(broad_phase.len() > 18_000, "the others are set");
+}

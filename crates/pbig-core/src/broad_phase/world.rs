@@ -1,8 +1,16 @@
-//! The world: what is kept of each box by id, and which boxes have changed since the last update. It knows no grid.
+//! The world: what is kept of each box by id, and which boxes have changed since the last update.
 
 use super::tree::Tree;
 use crate::id_set::IdSet;
+use crate::parallel::{SharedSlice, run, threads_for};
 use crate::{Aabb, ProxyFilter};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+/// Ids that a thread reads at a time.
+const PIECE: usize = 4096;
+
+/// Maximum share of changed ids, as one in this number, that are forgotten one by one.
+const FORGET_ONE_BY_ONE_IN: usize = 16;
 
 /// A byte for each id: flags.
 mod state {
@@ -70,70 +78,120 @@ impl World {
         self.present.reserve(ids);
     }
 
+    /// Returns all boxes.
+    #[inline(always)]
+    fn all(&mut self) -> Part<'_> {
+        let Self { boxes, filters, states, changed, valid, is_filtered, .. } = self;
+        Part { first: 0, boxes, filters, states, changed, valid, is_filtered, is_noted: false }
+    }
+
+    /// Does something with all boxes. The tree learns if one changes.
+    #[inline(always)]
+    fn change<R>(&mut self, change: impl FnOnce(&mut Part<'_>) -> R) -> R {
+        let mut all = self.all();
+        let result = change(&mut all);
+        if all.is_noted {
+            self.tree.expire();
+        }
+        result
+    }
+
     /// Moves a box that is present. Returns false, and does nothing, if it is not.
-    ///
-    /// A valid stored box is present, so its state is not read if it holds the new box. Its filter is read only if any box was
-    /// ever filtered.
     #[inline(always)]
     pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
-        if !self.set_aabb(id, aabb, margin) {
-            return false;
-        }
-        let i = id as usize;
-        let is_unfiltered = !self.is_filtered && filter.is(&ProxyFilter::ALL);
-        if !is_unfiltered && !self.filters[i].is(&filter) {
-            self.set_filter(id, filter);
-        }
-        true
+        self.change(|all| all.set(id, aabb, filter, margin))
     }
 
     /// As [`World::set`], with the filter that the box has.
     #[inline(always)]
     pub(super) fn set_aabb(&mut self, id: u32, aabb: Aabb, margin: f32) -> bool {
-        let i = id as usize;
-        let Some(fat) = self.boxes.get(i) else { return false };
-        let gaps = aabb.gaps_are_within(fat, slack(margin));
-        let is_held = gaps == Some(true) && aabb.is_valid();
-        if !is_held && !self.contains(id) {
-            return false;
+        self.change(|all| all.set_aabb(id, aabb, margin))
+    }
+
+    /// Moves many boxes on threads; their ids ascend. `of` returns box and filter of an id, or none to leave its box alone. Returns
+    /// those that are not present. After a panic in `of` some boxes have moved.
+    pub(super) fn set_many(
+        &mut self,
+        ids: &[u32],
+        of: impl Fn(u32) -> Option<(Aabb, ProxyFilter)> + Sync,
+        margin: f32,
+    ) -> Vec<(u32, Aabb, ProxyFilter)> {
+        let (known, is_filtered) = (self.ids(), self.is_filtered);
+        let pieces = ids.len().div_ceil(PIECE);
+        let mut moved: Vec<Moved> = (0..pieces).map(|_| Moved { is_filtered, ..Moved::default() }).collect();
+        let shared = SharedSlice::new(&mut moved);
+        let (boxes, filters) = (SharedSlice::new(&mut self.boxes), SharedSlice::new(&mut self.filters));
+        let states = SharedSlice::new(&mut self.states);
+        let done = catch_unwind(AssertUnwindSafe(|| {
+            run(threads_for(pieces), pieces, |_, piece| {
+                let ids = &ids[piece * PIECE..ids.len().min((piece + 1) * PIECE)];
+                let range = known.min(ids[0] as usize)..known.min(ids[ids.len() - 1] as usize + 1);
+                // SAFETY: ids ascend, so pieces have different ids.
+                let (boxes, filters, states, moved) = unsafe {
+                    let moved = &mut shared.part(piece..piece + 1)[0];
+                    (
+                        boxes.part(range.clone()),
+                        filters.part(range.clone()),
+                        states.part(range.clone()),
+                        moved,
+                    )
+                };
+                let Moved { changed, valid, is_filtered, absent } = moved;
+                let first = range.start as u32;
+                let mut part =
+                    Part { first, boxes, filters, states, changed, valid, is_filtered, is_noted: false };
+                for &id in ids {
+                    if let Some((aabb, filter)) = of(id)
+                        && !part.set(id, aabb, filter, margin)
+                    {
+                        absent.push((id, aabb, filter));
+                    }
+                }
+            });
+        }));
+        let absent = self.take_moved(moved);
+        done.unwrap_or_else(|panic| resume_unwind(panic));
+        absent
+    }
+
+    /// Takes what threads have noted.
+    fn take_moved(&mut self, moved: Vec<Moved>) -> Vec<(u32, Aabb, ProxyFilter)> {
+        let mut all_absent = Vec::new();
+        for Moved { changed, valid, is_filtered, absent } in moved {
+            if !changed.is_empty() {
+                self.tree.expire();
+            }
+            self.changed.extend(changed);
+            self.valid = self.valid.wrapping_add(valid);
+            self.is_filtered |= is_filtered;
+            all_absent.extend(absent);
         }
-        if !is_held && (gaps.is_some() || !holds_exactly(fat, aabb, slack(margin))) {
-            self.note_change(id);
-            self.put(i, aabb, margin);
-        }
-        true
+        all_absent
     }
 
     #[cold]
     pub(super) fn set_filter(&mut self, id: u32, filter: ProxyFilter) {
-        self.note_change(id);
-        self.filters[id as usize] = filter;
-        self.is_filtered |= !filter.is(&ProxyFilter::ALL);
+        self.change(|all| all.set_filter(id, filter));
     }
 
     /// Inserts a box that is not present; its id is known.
     #[cold]
     pub(super) fn insert(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) {
-        self.note_change(id);
         self.states[id as usize] |= state::PRESENT;
         self.present.insert(id);
-        self.put(id as usize, aabb, margin);
-        self.set_filter(id, filter);
-    }
-
-    /// Stores a box fat; an invalid one as nowhere, so that nothing pairs it later.
-    #[inline(always)]
-    fn put(&mut self, i: usize, aabb: Aabb, margin: f32) {
-        let is_valid = aabb.is_valid();
-        let was_valid = !self.boxes[i].min[0].is_nan();
-        self.boxes[i] = if is_valid { aabb.inflated(margin) } else { Aabb::NOWHERE };
-        self.valid = self.valid + u32::from(is_valid) - u32::from(was_valid);
+        self.change(|all| {
+            all.note_change(id);
+            all.put(id as usize, aabb, margin);
+            all.set_filter(id, filter);
+        });
     }
 
     /// Removes a box that is present.
     pub(super) fn remove(&mut self, id: u32) {
-        self.note_change(id);
-        self.put(id as usize, Aabb::NOWHERE, 0.0);
+        self.change(|all| {
+            all.note_change(id);
+            all.put(id as usize, Aabb::NOWHERE, 0.0);
+        });
         let state = &mut self.states[id as usize];
         if *state & state::REMOVED == 0 {
             self.removed.push(id);
@@ -142,21 +200,12 @@ impl World {
         self.present.remove(id);
     }
 
-    /// Notes a change of a box.
-    #[inline(always)]
-    pub(super) fn note_change(&mut self, id: u32) {
-        self.tree.expire();
-        let state = &mut self.states[id as usize];
-        if *state & state::CHANGED == 0 {
-            *state |= state::CHANGED;
-            self.changed.push(id);
-        }
-    }
-
     /// Forgets all changes, after an update. The tree has noted them.
     pub(super) fn forget_changes(&mut self) {
-        for &id in &self.changed {
-            self.states[id as usize] &= state::PRESENT;
+        if self.changed.len() * FORGET_ONE_BY_ONE_IN > self.ids() {
+            self.states.iter_mut().for_each(|state| *state &= state::PRESENT);
+        } else {
+            self.changed.iter().for_each(|id| self.states[*id as usize] &= state::PRESENT);
         }
         self.changed.clear();
         self.removed.clear();
@@ -175,6 +224,97 @@ impl World {
         self.removed.shrink_to_fit();
         self.present.shrink();
         self.tree = Tree::default();
+    }
+}
+
+/// Boxes that a thread has moved, and those that it could not.
+#[derive(Debug, Default)]
+struct Moved {
+    changed: Vec<u32>,
+    /// Valid boxes that there are more, modulo 2^32.
+    valid: u32,
+    is_filtered: bool,
+    absent: Vec<(u32, Aabb, ProxyFilter)>,
+}
+
+/// The boxes of all ids, or those of some consecutive ones, and where their changes are noted.
+struct Part<'a> {
+    first: u32,
+    boxes: &'a mut [Aabb],
+    filters: &'a mut [ProxyFilter],
+    states: &'a mut [u8],
+    changed: &'a mut Vec<u32>,
+    valid: &'a mut u32,
+    is_filtered: &'a mut bool,
+    /// A box has changed.
+    is_noted: bool,
+}
+
+impl Part<'_> {
+    /// Moves a box that is present. Returns false, and does nothing, if it is not.
+    ///
+    /// A valid stored box is present, so its state is not read if it holds the new box. Its filter is read only if any box was
+    /// ever filtered.
+    #[inline(always)]
+    fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
+        if !self.set_aabb(id, aabb, margin) {
+            return false;
+        }
+        let is_unfiltered = !*self.is_filtered && filter.is(&ProxyFilter::ALL);
+        if !is_unfiltered && !self.filters[self.at(id)].is(&filter) {
+            self.set_filter(id, filter);
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn at(&self, id: u32) -> usize {
+        (id - self.first) as usize
+    }
+
+    /// As [`Part::set`], with the filter that the box has.
+    #[inline(always)]
+    fn set_aabb(&mut self, id: u32, aabb: Aabb, margin: f32) -> bool {
+        let i = self.at(id);
+        let Some(fat) = self.boxes.get(i) else { return false };
+        let gaps = aabb.gaps_are_within(fat, slack(margin));
+        let is_held = gaps == Some(true) && aabb.is_valid();
+        if !is_held && self.states[i] & state::PRESENT == 0 {
+            return false;
+        }
+        if !is_held && (gaps.is_some() || !holds_exactly(fat, aabb, slack(margin))) {
+            self.note_change(id);
+            self.put(i, aabb, margin);
+        }
+        true
+    }
+
+    #[cold]
+    fn set_filter(&mut self, id: u32, filter: ProxyFilter) {
+        self.note_change(id);
+        let i = self.at(id);
+        self.filters[i] = filter;
+        *self.is_filtered |= !filter.is(&ProxyFilter::ALL);
+    }
+
+    /// Stores a box fat; an invalid one as nowhere, so that nothing pairs it later.
+    #[inline(always)]
+    fn put(&mut self, i: usize, aabb: Aabb, margin: f32) {
+        let is_valid = aabb.is_valid();
+        let was_valid = !self.boxes[i].min[0].is_nan();
+        self.boxes[i] = if is_valid { aabb.inflated(margin) } else { Aabb::NOWHERE };
+        *self.valid = self.valid.wrapping_add(u32::from(is_valid)).wrapping_sub(u32::from(was_valid));
+    }
+
+    /// Notes a change of a box.
+    #[inline(always)]
+    fn note_change(&mut self, id: u32) {
+        self.is_noted = true;
+        let i = self.at(id);
+        if self.states[i] & state::CHANGED == 0 {
+            self.states[i] |= state::CHANGED;
+            self.changed.push(id);
+        }
     }
 }
 
