@@ -1,6 +1,6 @@
 //! The plan in a report: what was done, and why, in words.
 
-use crate::grid::{GridPlan, NeighbourScan};
+use crate::Aabb;
 use crate::policy::NoDevice;
 use std::fmt;
 
@@ -38,6 +38,26 @@ impl Algorithm {
     }
 }
 
+/// The cells that a search visits for each box.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NeighbourScan {
+    /// Half of the 27 neighbouring cells, as five runs of sorted boxes, even if empty: fastest where cells hold few boxes.
+    #[default]
+    Runs,
+    /// The cells in which an overlapping box can lie: fastest where cells hold many. Two sets always have these.
+    Windows,
+}
+
+/// A cell of a grid with the boxes whose lower corners lie in it, or a leaf of a tree with its boxes.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct OccupiedCell {
+    /// The cell; a border cell reaches to the lower corners of the boxes beyond the border.
+    pub aabb: Aabb,
+    /// The ids of the boxes.
+    pub ids: Vec<u32>,
+}
+
 /// The algorithm of a call and its data. `Display` puts it in words.
 ///
 /// ```
@@ -72,20 +92,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Describes a search of a grid, or of two with one plan.
-    pub(crate) fn of_grid(plan: &GridPlan, boxes: usize, oversize: usize) -> Self {
-        Self {
-            algorithm: Algorithm::Grid,
-            boxes: boxes as u32,
-            origin: plan.cells.origin(),
-            cell: plan.cells.edges(),
-            dims: plan.cells.dims(),
-            scan: plan.scan,
-            oversize: oversize as u32,
-            ..Self::default()
-        }
-    }
-
     fn write_cells(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ([x, y, z], [dx, dy, dz]) = (self.cell, self.dims);
         write!(f, "; {dx} x {dy} x {dz} cells of {x:.3} x {y:.3} x {z:.3}")?;

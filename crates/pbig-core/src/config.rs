@@ -1,5 +1,7 @@
 //! The settings. Every field says its unit, why one would change it, and what follows.
 
+use crate::Error;
+
 /// The processor that does the work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -49,6 +51,12 @@ impl Limits {
     /// Returns [`Limits::max_pairs`], at most that of [`Limits::UNLIMITED`].
     pub(crate) fn pairs(&self) -> u64 {
         self.max_pairs.min(Self::UNLIMITED.max_pairs)
+    }
+
+    /// Returns an error if there are too many boxes.
+    pub(crate) fn check_boxes(&self, boxes: u64) -> Result<(), Error> {
+        let limit = self.max_boxes.min(Self::UNLIMITED.max_boxes);
+        if boxes > limit { Err(Error::TooManyBoxes { boxes, limit }) } else { Ok(()) }
     }
 }
 

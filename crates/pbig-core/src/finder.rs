@@ -1,14 +1,14 @@
 //! `Finder`: all pairs of a list of boxes, with nothing kept between calls but memory.
 
-use crate::all_pairs::{AllPairs, Request, Store};
-use crate::device_slot::{DeviceSlot, are_in_order};
 use crate::memory::Scratch;
-use crate::outcome::Outcome;
 use crate::pair_device::{PairDevice, SearchRequest};
 use crate::pairs::{Grouping, Groups};
 use crate::policy::Work;
 use crate::report::{Clock, Report, stage};
-use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Limits, Order, Pair, ProxyFilter};
+use crate::search::Outcome;
+use crate::search::{AllPairs, Request, Store};
+use crate::search::{DeviceSlot, are_in_order};
+use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Order, Pair, ProxyFilter};
 
 mod between;
 mod for_each;
@@ -136,7 +136,7 @@ impl Finder {
         self.report = Report::default();
         sets.iter().try_for_each(Boxes::check)?;
         let boxes = sets.iter().map(|set| set.boxes.len() as u64).sum();
-        check_count(boxes, &self.config.limits)?;
+        self.config.limits.check_boxes(boxes)?;
         self.report.boxes = boxes;
         Ok(())
     }
@@ -221,9 +221,4 @@ impl Finder {
     pub fn report(&self) -> &Report {
         &self.report
     }
-}
-
-pub(crate) fn check_count(boxes: u64, limits: &Limits) -> Result<(), Error> {
-    let limit = limits.max_boxes.min(Limits::UNLIMITED.max_boxes);
-    if boxes > limit { Err(Error::TooManyBoxes { boxes, limit }) } else { Ok(()) }
 }

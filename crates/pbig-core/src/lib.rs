@@ -57,21 +57,16 @@ struct Readme;
 
 mod aabb;
 mod algorithm;
-mod all_pairs;
 mod boxes;
 mod broad_phase;
-mod budget;
+mod bvh;
 mod config;
-mod device_slot;
 mod error;
 mod filter;
 mod finder;
-mod grid;
 mod id_set;
-mod index;
 mod memory;
 pub mod oracle;
-mod outcome;
 #[cfg(all(target_family = "wasm", target_os = "unknown"))]
 mod page_clock;
 mod pair;
@@ -80,29 +75,32 @@ mod pairs;
 mod parallel;
 mod policy;
 mod report;
-mod streamed;
+mod search;
+mod simd;
 
 pub use aabb::Aabb;
-pub use algorithm::{Algorithm, Plan};
+pub use algorithm::{Algorithm, NeighbourScan, OccupiedCell, Plan};
 pub use boxes::{Boxes, Keys, NO_KEY};
 pub use broad_phase::{BroadPhase, Events};
+pub use bvh::BoxIndex;
 pub use config::{Backend, Config, Engine, Limits, Order};
 pub use error::Error;
 pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};
-pub use grid::{NeighbourScan, OccupiedCell, simd};
-pub use index::BoxIndex;
 pub use pair::{CrossPair, Pair};
 pub use pair_device::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 pub use policy::NoDevice;
 pub use report::{Checks, DeviceReport, Report, StageTimes, WORK_LIMIT};
+pub use simd::simd;
 
 /// Items for the other crates of pbig. They may change in any release.
 #[doc(hidden)]
 pub mod internal {
-    pub use crate::grid::bounds::{SizeClass, SizeClasses, size_class_of, size_classes, spread_evenly};
     #[cfg(all(target_family = "wasm", target_os = "unknown"))]
     pub use crate::page_clock::set_clock;
     pub use crate::parallel::{SharedSlice, map, run, threads_for};
     pub use crate::report::Clock;
+    pub use crate::search::grid::bounds::{
+        SizeClass, SizeClasses, size_class_of, size_classes, spread_evenly,
+    };
 }

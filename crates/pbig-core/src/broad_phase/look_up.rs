@@ -3,15 +3,15 @@
 use super::Task;
 use super::tree::Tree;
 use super::world::World;
-use crate::budget::Budget;
-use crate::grid::{BLOCK, Simd, dispatch};
-use crate::index::BoxIndex;
+use crate::bvh::BoxIndex;
 use crate::memory::ShrinkingVec;
-use crate::outcome::{End, Outcome};
 use crate::pairs::{Comparison, Kept, differences, equal, sort_few};
 use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy;
 use crate::report::{Clock, stage};
+use crate::search::Budget;
+use crate::search::{End, Outcome};
+use crate::simd::{BLOCK, Simd, dispatch};
 use crate::{Algorithm, Checks, Engine, Pair, Plan};
 
 /// Work of a thread that it does not tell the others yet.

@@ -16,13 +16,12 @@ mod tree;
 mod update;
 mod world;
 
-use crate::device_slot::DeviceSlot;
-use crate::finder::check_count;
-use crate::grid::prefetch;
 use crate::memory::Scratch;
 use crate::pairs::{Comparison, Kept};
 use crate::policy::{self, PARALLEL_FROM_BOXES};
 use crate::report::Report;
+use crate::search::DeviceSlot;
+use crate::simd::prefetch;
 use crate::{Aabb, Algorithm, Backend, Config, Error, Limits, Pair, PairDevice, ProxyFilter};
 use look_up::LookUp;
 use search::Search;
@@ -216,7 +215,7 @@ impl BroadPhase {
     #[cold]
     fn insert(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
         if id as usize >= self.world.ids() {
-            check_count(u64::from(id) + 1, &self.config.limits)?;
+            self.config.limits.check_boxes(u64::from(id) + 1)?;
             self.check_density(id)?;
             self.world.reserve_ids(id as usize + 1);
         }

@@ -1,8 +1,8 @@
 //! Queries of a broad phase: its boxes, its pairs, and the report of the last update.
 
 use super::{BroadPhase, Events};
-use crate::grid::occupied_cells;
 use crate::report::Report;
+use crate::search::grid::occupied_cells;
 use crate::{Aabb, Algorithm, BoxIndex, Config, OccupiedCell, Pair, ProxyFilter};
 
 impl BroadPhase {

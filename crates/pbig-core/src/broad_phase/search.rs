@@ -4,12 +4,12 @@
 use super::Task;
 use super::tree::Tree;
 use super::world::World;
-use crate::all_pairs::{AllPairs, Request, Store};
-use crate::device_slot::DeviceSlot;
-use crate::outcome::{End, Outcome};
 use crate::pairs::{Grouping, Groups, Kept};
 use crate::policy;
 use crate::report::{Clock, stage};
+use crate::search::DeviceSlot;
+use crate::search::{AllPairs, Request, Store};
+use crate::search::{End, Outcome};
 use crate::{Aabb, Algorithm, Boxes, Config, Pair, ProxyFilter};
 
 /// The buffers of a search.
@@ -74,8 +74,11 @@ impl Search {
         let names = is_listed.then_some(&self.listed.ids[..]);
         if is_brute {
             let name = |place: u32| names.map_or(place, |names| names[place as usize]);
-            let found =
-                self.all_pairs.hits[0].pairs.iter().map(|pair| Pair { a: name(pair.a), b: name(pair.b) });
+            let found = self.all_pairs.hits[0]
+                .found
+                .pairs
+                .iter()
+                .map(|pair| Pair { a: name(pair.a), b: name(pair.b) });
             task.events.compare_sorted(world.present.iter(), found, task.kept);
             return false;
         }

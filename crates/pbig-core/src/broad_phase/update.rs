@@ -4,11 +4,11 @@ use super::look_up::LookUp;
 use super::search::Search;
 use super::tree::Tree;
 use super::{BroadPhase, Events, Task};
-use crate::device_slot::DeviceSlot;
-use crate::outcome::{End, Outcome};
 use crate::pairs::Comparison;
 use crate::policy::{self, Work};
 use crate::report::Clock;
+use crate::search::DeviceSlot;
+use crate::search::{End, Outcome};
 use crate::{Backend, Engine, Error, Plan};
 
 /// What finds the events.

@@ -1,11 +1,11 @@
 //! Pairs of a box of one set with a box of another one.
 
 use super::{Finder, Sets};
-use crate::all_pairs::Request;
-use crate::grid::Receiver;
 use crate::pairs::Grouping;
 use crate::parallel::{SharedSlice, piece_range, run, threads_for};
 use crate::report::{Clock, stage};
+use crate::search::Receiver;
+use crate::search::Request;
 use crate::{Boxes, CrossPair, Error, Order, Pair};
 
 /// Pairs whose ids a thread looks up at a time.

@@ -1,7 +1,7 @@
 //! Pairs without a list: each is handed to a closure where it is found.
 
 use super::{Finder, Sets};
-use crate::all_pairs::Request;
+use crate::search::Request;
 use crate::{Boxes, CrossPair, Error, Pair};
 
 impl Finder {

@@ -1,9 +1,9 @@
 //! The boxes of two sets that may have pairs: without those that miss all of the other set, if these are many.
 
-use crate::grid::ById;
-use crate::grid::bounds::{bounds_of, spread_evenly};
 use crate::parallel::{SharedSlice, ensure_scratch, map, piece_range};
 use crate::policy::{FEW_BOXES, PARALLEL_FROM_BOXES};
+use crate::search::ById;
+use crate::search::grid::bounds::{bounds_of, spread_evenly};
 use crate::{Aabb, Boxes, CrossPair, Keys, NO_KEY, Pair, ProxyFilter};
 use std::ops::Range;
 

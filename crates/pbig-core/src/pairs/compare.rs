@@ -4,9 +4,9 @@ use super::groups::{self, Groups, Span};
 use super::kept::{Kept, Rows};
 use super::row::{self, equal};
 use crate::Pair;
-use crate::grid::{Simd, dispatch};
 use crate::memory::ShrinkingVec;
 use crate::parallel::SharedSlice;
+use crate::simd::{Simd, dispatch};
 use std::ops::Range;
 
 /// The result of a comparison. `added` and `removed` are sorted.

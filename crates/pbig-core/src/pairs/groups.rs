@@ -1,11 +1,12 @@
 //! Groups: found pairs gathered by ranges of `a`, so that each group is sorted within the cache, by any thread.
 
+use super::Found;
 use super::row::{self, SHORT};
 use crate::Pair;
-use crate::grid::{Hits, Simd, dispatch};
 use crate::id_set::IdSet;
 use crate::memory::ShrinkingVec;
 use crate::parallel::{SharedSlice, ensure_scratch, run, run_with};
+use crate::simd::{Simd, dispatch};
 use std::ops::{Range, RangeInclusive};
 
 /// log2 of the ids in a group: in larger groups the rows do not fit the cache.
@@ -68,20 +69,19 @@ pub(crate) struct Groups {
 
 impl Groups {
     /// Gathers the pairs that threads have found and counted by this grouping, and returns their number.
-    pub(crate) fn gather(&mut self, grouping: Grouping, hits: &mut [Hits], workers: usize) -> usize {
+    pub(crate) fn gather(&mut self, grouping: Grouping, mut lists: Vec<&mut Found>, workers: usize) -> usize {
         self.grouping = grouping;
-        let count = self.place(hits);
-        if let ([hits], 1) = (&mut *hits, grouping.count) {
-            std::mem::swap(&mut self.pairs, &mut hits.pairs);
+        let count = self.place(&mut lists);
+        if let ([list], 1) = (&mut lists[..], grouping.count) {
+            std::mem::swap(&mut self.pairs, &mut list.pairs);
             return count;
         }
         ensure_scratch(&mut self.pairs, count, Pair::default());
         let pairs = SharedSlice::new(&mut self.pairs);
-        let lists = hits.len();
-        let hits = SharedSlice::new(hits);
-        run(workers, lists, |_, list| {
+        let (len, lists) = (lists.len(), SharedSlice::new(&mut lists));
+        run(workers, len, |_, list| {
             // SAFETY: each piece has its own list.
-            let Hits { pairs: found, groups: next, .. } = unsafe { &mut hits.part(list..list + 1)[0] };
+            let Found { pairs: found, groups: next, .. } = unsafe { &mut *lists.part(list..list + 1)[0] };
             for pair in found.iter() {
                 let place = &mut next[(pair.a >> grouping.shift) as usize];
                 // SAFETY: every pair of every list has its own place.
@@ -107,12 +107,12 @@ impl Groups {
     }
 
     /// Turns the counts of all lists into places.
-    fn place(&mut self, hits: &mut [Hits]) -> usize {
+    fn place(&mut self, lists: &mut [&mut Found]) -> usize {
         self.starts.clear();
         let mut next = 0;
         for group in 0..self.grouping.count {
             self.starts.push(next);
-            for list in hits.iter_mut() {
+            for list in lists.iter_mut() {
                 next += std::mem::replace(&mut list.groups[group], next);
             }
         }

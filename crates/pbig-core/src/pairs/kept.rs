@@ -2,10 +2,10 @@
 
 use super::groups::Span;
 use crate::Pair;
-use crate::grid::prefetch;
 use crate::memory::{Scratch, ShrinkingVec};
 use crate::parallel::{SharedSlice, available_threads, piece_range, run};
 use crate::policy::PARALLEL_FROM_BOXES;
+use crate::simd::prefetch;
 use std::sync::OnceLock;
 
 /// Minimum room of a row that has outgrown its place.

@@ -1,8 +1,8 @@
 //! Sorts short rows of ids, and compares two rows.
 
 use crate::Pair;
-use crate::grid::Simd;
 use crate::id_set::IdSet;
+use crate::simd::Simd;
 use std::ops::Range;
 
 /// Ids of a row that one register holds.
@@ -163,7 +163,7 @@ mod tests {
         let old = [2, 4, 6, 5, 7, 5, 7, 5, 7];
         let new = [4, 5, 6, 7, 2, 2, 2, 2, 2];
         for (old, new) in [(&old[..], &new[..]), (&old[..3], &new[..4]), (&old[..], &new[..4])] {
-            let [added, removed] = crate::grid::dispatch!(compared, old, new);
+            let [added, removed] = crate::simd::dispatch!(compared, old, new);
             assert_eq!(added, [5, 7].map(|b| Pair { a: 1, b }));
             assert_eq!(removed, [Pair { a: 1, b: 2 }]);
         }
@@ -190,8 +190,8 @@ mod tests {
             let pool = [&rows.concat()[..], &[0, 1, u32::MAX, 3, 4, 5, 6, 7]].concat();
             let mut wanted = rows;
             wanted.iter_mut().for_each(|row| row.sort_unstable());
-            assert_eq!(crate::grid::dispatch!(sorted, &pool, len), wanted.concat(), "{len}");
-            assert_eq!(sorted(crate::grid::Portable, &pool, len), wanted.concat(), "{len}, portable");
+            assert_eq!(crate::simd::dispatch!(sorted, &pool, len), wanted.concat(), "{len}");
+            assert_eq!(sorted(crate::simd::Portable, &pool, len), wanted.concat(), "{len}, portable");
         }
     }
 
@@ -202,7 +202,7 @@ mod tests {
             let ids: Vec<u32> = (0..len).map(|i| 1000 + (i * 7 % (len - 3)) as u32).collect();
             let pool = [&ids[..], &[0; SHORT]].concat();
             let mut to = vec![u32::MAX; len];
-            sort_into(crate::grid::Portable, &pool, 0..len, &mut to, &mut IdSet::default());
+            sort_into(crate::simd::Portable, &pool, 0..len, &mut to, &mut IdSet::default());
             to.sort_unstable();
             to.dedup();
             assert!(to.into_iter().eq(1000..1000 + (len as u32 - 3)), "{len}");

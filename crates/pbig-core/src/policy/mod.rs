@@ -1,12 +1,12 @@
 //! The choices of engine, backend, cells and threads, and their constants. A choice is a fixed rule on counts, never on a clock:
 //! the same boxes and the same calls take the same path on every machine.
 //!
-//! Constants of plans and threads are here; `engine` chooses how an update is made, `backend` where a call runs. A constant that
+//! Constants of plans and threads are here; `engine` chooses how an update is made, `search` and `bvh` have the budgets and the upkeep of the tree, `backend` where a call runs. A constant that
 //! one file alone uses stands in that file.
 
 mod backend;
+pub(crate) mod bvh;
 mod engine;
-pub(crate) mod index;
 pub(crate) mod search;
 
 pub use backend::NoDevice;

@@ -5,7 +5,7 @@
 //! An interval with all points of a part goes on to the next axis with them; one with some goes on to both halves. What is left on
 //! the last axis overlaps, without a test.
 
-use crate::grid::{Hits, Rule};
+use super::hits::{Hits, Rule};
 use crate::parallel::{SharedSlice, run_with};
 use crate::policy::PARALLEL_FROM_BOXES;
 use crate::{Aabb, Pair};
@@ -82,7 +82,7 @@ fn stream(intervals: &[Corners], points: &[Corners], rule: &Rule<'_>, hits: &mut
     run_with(hits, len.div_ceil(size), |hits, part| {
         // SAFETY: each part has its own points.
         let points = unsafe { points.part(part * size..len.min((part + 1) * size)) };
-        let mut stream = Stream { rule, from: hits.pairs.len(), hits };
+        let mut stream = Stream { rule, from: hits.found.pairs.len(), hits };
         stream.find(intervals, points, 2);
         stream.keep();
     });
@@ -147,8 +147,8 @@ impl Stream<'_, '_> {
     }
 
     fn push(&mut self, one: &Corners, other: &Corners) {
-        self.hits.pairs.push(Pair::new(one.id, other.id));
-        if self.hits.pairs.len() >= self.from + BATCH {
+        self.hits.found.pairs.push(Pair::new(one.id, other.id));
+        if self.hits.found.pairs.len() >= self.from + BATCH {
             self.keep();
         }
     }
@@ -156,7 +156,7 @@ impl Stream<'_, '_> {
     /// Filters and counts the pairs so far.
     fn keep(&mut self) {
         self.hits.keep(self.from, self.rule);
-        self.from = self.hits.pairs.len();
+        self.from = self.hits.found.pairs.len();
     }
 }
 
@@ -175,7 +175,7 @@ fn chosen(boxes: &[Corners], is_chosen: impl Fn(&Corners) -> bool) -> Vec<Corner
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::tests::needles;
+    use crate::bvh::tests::needles;
     use crate::oracle;
     use rand::rngs::StdRng;
     use rand::{RngExt, SeedableRng};
@@ -202,9 +202,9 @@ mod tests {
                 .collect();
             for split in [None, Some(0), Some(boxes.len() / 3), Some(boxes.len())] {
                 let (found, mut hits) = (AtomicU64::new(0), [Hits::default(), Hits::default()]);
-                hits.iter_mut().for_each(|hits| hits.begin(0, 0));
+                hits.iter_mut().for_each(|hits| hits.begin(None));
                 find_pairs(&boxes, split.map(|split| split as u32), &Rule::listing(None, &found), &mut hits);
-                let mut found = [&hits[0].pairs[..], &hits[1].pairs].concat();
+                let mut found = [&hits[0].found.pairs[..], &hits[1].found.pairs].concat();
                 found.sort_unstable();
                 let is_across = |pair: &Pair| {
                     split.is_none_or(|split| (pair.a as usize) < split && pair.b as usize >= split)
@@ -222,7 +222,7 @@ mod tests {
     fn needles_in_three_directions_take_little_more_work_each_if_they_are_more() {
         let work = [20_000, 160_000].map(|n: usize| {
             let (found, mut hits) = (AtomicU64::new(0), [Hits::default()]);
-            hits[0].begin(0, 0);
+            hits[0].begin(None);
             find_pairs(&needles(n), None, &Rule::listing(None, &found), &mut hits);
             hits[0].work() as f64 / n as f64
         });

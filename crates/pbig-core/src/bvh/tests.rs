@@ -2,11 +2,10 @@
 
 use super::query::Cast;
 use super::{BoxIndex, walk};
-use crate::grid::{Hits, Portable, Rule, Simd};
-use crate::{Aabb, Config, Engine, Finder, Pair, oracle};
+use crate::simd::{Portable, Simd};
+use crate::{Aabb, Config, Engine, Finder};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use std::sync::atomic::AtomicU64;
 
 fn random_box(rng: &mut StdRng, reach: f32) -> Aabb {
     let half = match rng.random_range(0..20) {
@@ -125,42 +124,6 @@ fn compare(mut found: Vec<u32>, wanted: impl Iterator<Item = usize>, may_be: imp
         assert!(found.binary_search(&(id as u32)).is_ok(), "box {id} was missed");
     }
     assert!(found.iter().all(|&id| may_be(id as usize)), "a box far away was visited");
-}
-
-/// Returns all pairs that a sorted index finds on this number of threads.
-fn joined(boxes: &[Aabb], threads: usize) -> Vec<Pair> {
-    let mut index = BoxIndex::default();
-    index.sort(boxes);
-    let found = AtomicU64::new(0);
-    let rule = Rule::listing(None, &found);
-    let mut hits = vec![Hits::default(); threads];
-    hits.iter_mut().for_each(|hits| hits.begin(0, 0));
-    index.find_pairs(None, &rule, &mut hits);
-    let mut pairs: Vec<Pair> = hits.iter().flat_map(|hits| hits.pairs.iter().copied()).collect();
-    pairs.sort_unstable();
-    pairs
-}
-
-#[test]
-fn a_join_finds_the_pairs_of_the_oracle() {
-    let mut random = StdRng::seed_from_u64(5);
-    for n in (0..100).chain([1000, 20_000]) {
-        let width = (n as f32).cbrt() * 1.5;
-        let mut boxes: Vec<Aabb> = (0..n)
-            .map(|i| {
-                let size = 2f32.powi(i % 7 * (i % 3) - 3);
-                let half = [size, 1.0, 0.3].map(|half| half * random.random_range(0.2..0.5));
-                Aabb::from_center([0; 3].map(|_| random.random_range(0.0..=width)), half)
-            })
-            .collect();
-        let odd = [
-            Aabb::NOWHERE,
-            Aabb::new([1.0; 3], [0.0; 3]),
-            Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]),
-        ];
-        boxes.iter_mut().skip(5).step_by(41).zip(odd.iter().cycle()).for_each(|(to, odd)| *to = *odd);
-        assert_eq!(joined(&boxes, 1 + n as usize % 3), oracle::pairs(&boxes), "{n} boxes");
-    }
 }
 
 #[test]
@@ -472,11 +435,11 @@ fn instructions_gather_and_order_as_the_portable_ones_do() {
     for _ in 0..2000 {
         let boxes: Vec<Aabb> = (0..20).map(|_| random_box(&mut rng, 5.0)).collect();
         let at = [0; 8].map(|_| rng.random_range(0..22u32).checked_sub(1).unwrap_or(u32::MAX));
-        assert_eq!(crate::grid::dispatch!(gathered, &boxes, &at), gathered(Portable, &boxes, &at));
+        assert_eq!(crate::simd::dispatch!(gathered, &boxes, &at), gathered(Portable, &boxes, &at));
         let number =
             |rng: &mut StdRng| [0.0, 1.0, f32::MAX, f32::INFINITY, rng.random()][rng.random_range(0..5)];
         let [keys, limits] = [(); 2].map(|()| [0; 8].map(|_| number(&mut rng)));
-        let ours = crate::grid::dispatch!(ordered, &keys, &limits, &at);
+        let ours = crate::simd::dispatch!(ordered, &keys, &limits, &at);
         assert_eq!(ours, ordered(Portable, &keys, &limits, &at), "{keys:?} {limits:?}");
     }
 }

@@ -1,6 +1,6 @@
 //! The device of a finder or a broad phase, if it has one, and the report of a device that cannot do the work.
 
-use crate::outcome::{End, Outcome};
+use super::{End, Outcome};
 use crate::pair_device::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 use crate::policy::{Choice, Work, choose_backend};
 use crate::report::{Clock, Report, StageTimes, stage};

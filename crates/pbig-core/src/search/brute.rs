@@ -1,8 +1,8 @@
 //! Brute force: every pair is tested.
 
 use super::hits::{BATCH, Hits, Rule};
-use super::simd::{BLOCK, EightBoxes, Simd, dispatch};
 use crate::parallel::run_with;
+use crate::simd::{BLOCK, EightBoxes, Simd, dispatch};
 use crate::{Aabb, Pair};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -46,7 +46,7 @@ fn test_all(
     hits: &mut Hits,
 ) {
     for (i, &id) in ids.iter().enumerate() {
-        let (aabb, from) = (&boxes[id as usize], hits.pairs.len());
+        let (aabb, from) = (&boxes[id as usize], hits.found.pairs.len());
         // The first block also has the box itself and those before it.
         let mut wanted = 255 & !((2 << (i % BLOCK)) - 1);
         for (block, Block(eight)) in blocks.iter().enumerate().skip(i / BLOCK) {
@@ -54,7 +54,7 @@ fn test_all(
             wanted = 255;
             while met != 0 {
                 let b = ids[block * BLOCK + met.trailing_zeros() as usize];
-                hits.pairs.push(Pair { a: id, b });
+                hits.found.pairs.push(Pair { a: id, b });
                 met &= met - 1;
             }
         }
@@ -97,19 +97,19 @@ fn test_piece(
     rule: &Rule<'_>,
     hits: &mut Hits,
 ) -> usize {
-    let (mut from, mut valid) = (hits.pairs.len(), 0);
+    let (mut from, mut valid) = (hits.found.pairs.len(), 0);
     for (aabb, id) in many.iter().zip(first_id..).filter(|(aabb, _)| aabb.is_valid()) {
         valid += 1;
         for (block, Block(eight)) in blocks.iter().enumerate() {
             let mut met = simd.overlaps_eight(eight, aabb);
             while met != 0 {
-                hits.pairs.push(Pair::new(ids[block * BLOCK + met.trailing_zeros() as usize], id));
+                hits.found.pairs.push(Pair::new(ids[block * BLOCK + met.trailing_zeros() as usize], id));
                 met &= met - 1;
             }
         }
-        if hits.pairs.len() - from >= BATCH {
+        if hits.found.pairs.len() - from >= BATCH {
             hits.keep(from, rule);
-            from = hits.pairs.len();
+            from = hits.found.pairs.len();
         }
         if hits.is_full {
             break;

@@ -2,18 +2,8 @@
 
 use super::bounds::{Bounds, SAMPLE_SIZE, Sample, SizeClass, size_classes_of_both};
 use super::cells::{Cells, MAX_STEPS_PER_BOX};
-use crate::Aabb;
 use crate::policy;
-
-/// The cells that a search visits for each box.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum NeighbourScan {
-    /// Half of the 27 neighbouring cells, as five runs of sorted boxes, even if empty: fastest where cells hold few boxes.
-    #[default]
-    Runs,
-    /// The cells in which an overlapping box can lie: fastest where cells hold many. Two sets always have these.
-    Windows,
-}
+use crate::{Aabb, Algorithm, NeighbourScan, Plan};
 
 /// A grid to be built.
 #[derive(Clone, Copy, Debug, Default)]
@@ -23,6 +13,20 @@ pub(crate) struct GridPlan {
 }
 
 impl GridPlan {
+    /// Describes a search of the grid, or of two with this plan.
+    pub(crate) fn told(&self, boxes: usize, oversize: usize) -> Plan {
+        Plan {
+            algorithm: Algorithm::Grid,
+            boxes: boxes as u32,
+            origin: self.cells.origin(),
+            cell: self.cells.edges(),
+            dims: self.cells.dims(),
+            scan: self.scan,
+            oversize: oversize as u32,
+            ..Plan::default()
+        }
+    }
+
     /// Plans a grid for the valid ones of some boxes, or two grids for those of two sets.
     pub(crate) fn new(boxes: &[Aabb], others: Option<&[Aabb]>, workers: usize) -> Self {
         let both = [boxes, others.unwrap_or(&[])];

@@ -1,9 +1,14 @@
 //! The inner loops' instructions: AVX2 where the processor has it, chosen at run time; plain Rust elsewhere.
 
 #[cfg(target_arch = "x86_64")]
-use super::avx2::Avx2;
-use super::cells::{APART, Cells, Steps, TOMBSTONE, code_portable, steps_portable};
+mod avx2;
+mod codes;
+
 use crate::Aabb;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx2::Avx2;
+use codes::{APART, code_portable, steps_portable};
+pub(crate) use codes::{Steps, TOMBSTONE, query_of};
 
 /// Codes tested together: a cache line of them.
 pub(crate) const BLOCK: usize = 8;
@@ -16,14 +21,15 @@ pub(crate) type Eight = [u32; BLOCK];
 
 /// One implementation of the inner loops. A value is a proof that the processor has the instructions.
 pub(crate) trait Simd: Copy {
-    /// Returns both corners of a box in steps.
-    fn steps(self, cells: &Cells, aabb: &Aabb) -> (Steps, Steps);
+    /// Returns both corners of a box in steps: `scale` of them in a length unit, from `origin` on.
+    fn steps(self, origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps);
 
-    /// Returns the key of the cell of a point, see [`Cells::cell`].
-    fn key(self, cells: &Cells, point: Steps) -> u32;
+    /// Returns the number, row by row, of the cell of a point. A cell has `1 << shift` steps, and there are `dims` of them by axis. The
+    /// point is wrapped into these, or clamped into those that have neighbours on both sides.
+    fn key(self, dims: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32;
 
-    /// Returns true for a valid box that is not oversize, see [`Cells::takes`].
-    fn takes(self, cells: &Cells, aabb: &Aabb) -> bool;
+    /// Returns true for a valid box with these extents at most.
+    fn fits(self, most: &[f32; 3], aabb: &Aabb) -> bool;
 
     /// Returns the code of a box.
     fn code(self, low: Steps, high: Steps) -> u64;
@@ -71,7 +77,7 @@ pub(crate) trait Simd: Copy {
 
 /// Borrows eight numbers of a list, from a place on.
 #[inline(always)]
-pub(super) fn eight_from(list: &mut [u32], from: usize) -> &mut Eight {
+pub(crate) fn eight_from(list: &mut [u32], from: usize) -> &mut Eight {
     list[from..].first_chunk_mut().expect("lists have room for a block more")
 }
 
@@ -89,18 +95,26 @@ impl Portable {
 
 impl Simd for Portable {
     #[inline(always)]
-    fn steps(self, cells: &Cells, aabb: &Aabb) -> (Steps, Steps) {
-        steps_portable(cells, aabb)
+    fn steps(self, origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps) {
+        steps_portable(origin, scale, aabb)
     }
 
     #[inline(always)]
-    fn key(self, cells: &Cells, point: Steps) -> u32 {
-        cells.key(cells.cell(point))
+    fn key(self, dims: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32 {
+        let [x, y, z] = std::array::from_fn(|k| {
+            let cell = point[k] >> shift;
+            if wraps { cell & (dims[k] - 1) } else { cell.clamp(1, dims[k] - 2) }
+        });
+        ((z * dims[1] + y) * dims[0] + x) as u32
     }
 
     #[inline(always)]
-    fn takes(self, cells: &Cells, aabb: &Aabb) -> bool {
-        cells.takes(aabb)
+    fn fits(self, most: &[f32; 3], aabb: &Aabb) -> bool {
+        let fits = |k: usize| {
+            let extent = aabb.max[k] - aabb.min[k];
+            (extent >= 0.0) & (extent <= most[k])
+        };
+        fits(0) & fits(1) & fits(2)
     }
 
     #[inline(always)]
@@ -243,9 +257,9 @@ pub fn simd() -> &'static str {
 #[cfg(target_arch = "x86_64")]
 macro_rules! dispatch {
     ($work:path, $($argument:expr),*) => {
-        match $crate::grid::Avx2::detect() {
+        match $crate::simd::Avx2::detect() {
             Some(avx2) => avx2.run(#[inline(always)] || $work(avx2, $($argument),*)),
-            None => $crate::grid::Portable.run(#[inline(always)] || $work($crate::grid::Portable, $($argument),*)),
+            None => $crate::simd::Portable.run(#[inline(always)] || $work($crate::simd::Portable, $($argument),*)),
         }
     };
 }
@@ -254,7 +268,7 @@ macro_rules! dispatch {
 #[cfg(not(target_arch = "x86_64"))]
 macro_rules! dispatch {
     ($work:path, $($argument:expr),*) => {
-        $crate::grid::Portable.run(#[inline(always)] || $work($crate::grid::Portable, $($argument),*))
+        $crate::simd::Portable.run(#[inline(always)] || $work($crate::simd::Portable, $($argument),*))
     };
 }
 pub(crate) use dispatch;

@@ -1,7 +1,7 @@
 //! The inner loops by AVX2, which all x86-64 processors of the last ten years have.
 
-use super::cells::{APART, Cells, MAX_STEP, MIN_STEP, Steps, TOMBSTONE};
-use super::simd::{BLOCK, Eight, EightBoxes, Simd};
+use super::codes::{APART, MAX_STEP, MIN_STEP, Steps, TOMBSTONE};
+use super::{BLOCK, Eight, EightBoxes, Simd};
 use crate::Aabb;
 use std::arch::x86_64::*;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -76,12 +76,12 @@ static SET_BITS: [u64; 256] = {
 
 impl Simd for Avx2 {
     #[inline(always)]
-    fn steps(self, cells: &Cells, aabb: &Aabb) -> (Steps, Steps) {
+    fn steps(self, origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps) {
         // SAFETY: `self` proves the instructions; each load is of an array of four.
         unsafe {
             let (min, max) = aabb.corners();
-            let origin = _mm256_loadu_pd(cells.origin.as_ptr());
-            let scale = _mm256_loadu_pd(cells.scale.as_ptr());
+            let origin = _mm256_loadu_pd(origin.as_ptr());
+            let scale = _mm256_loadu_pd(scale.as_ptr());
             let steps = |corner: __m128| -> Steps {
                 let x = _mm256_mul_pd(_mm256_sub_pd(_mm256_cvtps_pd(corner), origin), scale);
                 // The second operand wins where the first is NaN.
@@ -93,13 +93,12 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn key(self, cells: &Cells, point: Steps) -> u32 {
-        let [x, y, z] = cells.dims;
+    fn key(self, [x, y, z]: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32 {
         // SAFETY: `self` proves the instructions.
         unsafe {
             let point: __m128i = bytemuck::cast(point);
-            let cell = _mm_sra_epi32(point, _mm_cvtsi32_si128(cells.shift as i32));
-            let cell = if cells.wraps {
+            let cell = _mm_sra_epi32(point, _mm_cvtsi32_si128(shift as i32));
+            let cell = if wraps {
                 _mm_and_si128(cell, _mm_setr_epi32(x - 1, y - 1, z - 1, 0))
             } else {
                 let most = _mm_setr_epi32(x - 2, y - 2, z - 2, 0);
@@ -112,8 +111,7 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn takes(self, cells: &Cells, aabb: &Aabb) -> bool {
-        let [x, y, z] = cells.max_extent;
+    fn fits(self, &[x, y, z]: &[f32; 3], aabb: &Aabb) -> bool {
         // SAFETY: `self` proves the instructions.
         unsafe {
             let (min, max) = aabb.corners();

@@ -4,9 +4,9 @@ use super::BoxIndex;
 use super::node::{LANES, NONE, Node, extent_sum};
 use super::sort::{Entry, Order, sort};
 use crate::Aabb;
-use crate::grid::{Simd, dispatch, prefetch};
 use crate::parallel::{SharedSlice, available_threads, run};
-use crate::policy::{PARALLEL_FROM_BOXES, index as policy};
+use crate::policy::{PARALLEL_FROM_BOXES, bvh as policy};
+use crate::simd::{Simd, dispatch, prefetch};
 use std::sync::atomic::Ordering;
 
 /// Leaves that a thread reads at a time.

@@ -4,14 +4,13 @@
 //! tested, while the records further ahead are on their way. (Tested at once, each would wait for its record.) The test
 //! has no branch: a pair is written, and kept or overwritten by the next one.
 
+use super::Budget;
 use super::brute::Block;
 use super::record::Record;
-use super::simd::{BLOCK, Simd, eight_from, prefetch};
 use crate::boxes::share_no_key;
-use crate::budget::Budget;
-use crate::memory::ShrinkingVec;
-use crate::pairs::Grouping;
+use crate::pairs::{Found, Grouping};
 use crate::policy::search::{WORK_OF_EXACT_TEST, WORK_OF_VAGUE_TEST, in_vain};
+use crate::simd::{BLOCK, Simd, eight_from, prefetch};
 use crate::{Keys, Pair, ProxyFilter};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -86,11 +85,7 @@ impl<'a> Rule<'a> {
 pub(crate) struct Hits {
     queries: Vec<u32>,
     places: Vec<u32>,
-    /// The pairs, in no particular order.
-    pub(crate) pairs: ShrinkingVec<Pair>,
-    /// By group of `a` (`a >> group_shift`): pairs found. Empty if pairs are not counted by group.
-    pub(crate) groups: Vec<u32>,
-    pub(crate) group_shift: u32,
+    pub(crate) found: Found,
     /// Candidates tested.
     pub(crate) tests: u64,
     /// Work besides a unit for each test: cells and nodes looked at, and what makes a test longer.
@@ -146,28 +141,12 @@ impl<'a> HitWriter<'a> {
 
 impl Hits {
     /// Forgets the pairs of an earlier search; counts those of the next one by group, if there is a grouping.
-    pub(crate) fn begin_for(&mut self, grouping: Option<Grouping>) {
-        let Grouping { count, shift, .. } = grouping.unwrap_or_default();
-        self.begin(count, shift);
-    }
-
-    /// Forgets the pairs of an earlier search; counts those of the next one in `groups` groups of `1 << shift` ids.
-    pub(crate) fn begin(&mut self, groups: usize, shift: u32) {
+    pub(crate) fn begin(&mut self, grouping: Option<Grouping>) {
         self.queries.resize(HIT_ROOM * BLOCK + AHEAD, 0);
         self.places.resize(HIT_ROOM * BLOCK + AHEAD, 0);
-        self.pairs.clear();
-        self.groups.clear();
-        self.groups.resize(groups, 0);
-        self.group_shift = shift;
+        self.found.begin(grouping);
         (self.tests, self.extra, self.overlaps, self.handed_over) = (0, 0, 0, 0);
         (self.accounted, self.charged, self.is_full) = (0, (0, 0), false);
-    }
-
-    /// Forgets the pairs, and gives back memory if as many as `needed` are expected.
-    pub(crate) fn settle(&mut self, needed: usize) {
-        let needed = needed.max(self.pairs.len());
-        self.pairs.clear();
-        self.pairs.settle(needed);
     }
 
     /// Returns the work so far, in tests of codes.
@@ -228,13 +207,13 @@ impl Hits {
 
     #[inline(always)]
     fn test(&mut self, own: &[Record], records: &[Record], candidates: usize, rule: &Rule<'_>) {
-        let from = self.pairs.len();
-        self.pairs.reserve(candidates + 1);
+        let from = self.found.pairs.len();
+        self.found.pairs.reserve(candidates + 1);
         let (queries, places) = (&self.queries[..candidates], &self.places[..candidates + AHEAD]);
         let candidates = queries.iter().zip(places).zip(&places[AHEAD..]);
         // SAFETY: the pairs have room for all candidates, and for one more that is overwritten.
         unsafe {
-            let start = self.pairs.as_mut_ptr().add(from);
+            let start = self.found.pairs.as_mut_ptr().add(from);
             let mut next = start;
             for ((&query, &place), &ahead) in candidates {
                 prefetch(records.as_ptr().wrapping_add(ahead as usize));
@@ -242,7 +221,7 @@ impl Hits {
                 next.write(Pair::new(one.id, other.id));
                 next = next.add(usize::from(one.overlaps(other)));
             }
-            self.pairs.set_len(from + next.offset_from(start) as usize);
+            self.found.pairs.set_len(from + next.offset_from(start) as usize);
         }
         self.keep(from, rule);
     }
@@ -250,7 +229,7 @@ impl Hits {
     /// Filters, counts and accounts for the pairs from `from` on.
     #[inline(always)]
     pub(crate) fn keep(&mut self, from: usize, rule: &Rule<'_>) {
-        self.overlaps += (self.pairs.len() - from) as u64;
+        self.overlaps += (self.found.pairs.len() - from) as u64;
         if let Some(filters) = rule.filters {
             self.filter(from, filters, ProxyFilter::allows);
         }
@@ -258,15 +237,15 @@ impl Hits {
             self.filter(from, keys, share_no_key);
         }
         if let Some(receiver) = rule.receiver {
-            if self.pairs.len() >= BATCH {
+            if self.found.pairs.len() >= BATCH {
                 self.hand_over(receiver);
             }
             return;
         }
-        self.count_groups(from);
-        let new = self.pairs.len() - self.accounted;
+        self.found.count(from);
+        let new = self.found.pairs.len() - self.accounted;
         if new >= BATCH {
-            self.accounted = self.pairs.len();
+            self.accounted = self.found.pairs.len();
             let found = rule.found.fetch_add(new as u64, Ordering::Relaxed) + new as u64;
             self.is_full |= found > rule.max_pairs;
         }
@@ -274,14 +253,14 @@ impl Hits {
 
     /// Hands over the pairs so far.
     pub(crate) fn hand_over(&mut self, receiver: Receiver<'_>) {
-        self.handed_over += self.pairs.len() as u64;
-        receiver(&self.pairs);
-        self.pairs.clear();
+        self.handed_over += self.found.pairs.len() as u64;
+        receiver(&self.found.pairs);
+        self.found.pairs.clear();
     }
 
     /// Returns the number of pairs found: listed ones, and those that a receiver got.
     pub(crate) fn count(&self) -> u64 {
-        self.handed_over + self.pairs.len() as u64
+        self.handed_over + self.found.pairs.len() as u64
     }
 
     /// Tests a box exactly against each of a run. The pairs from `from` on were not filtered and counted yet. Keeps them if they are many,
@@ -297,9 +276,9 @@ impl Hits {
             self.tests += run.len() as u64;
             self.extra += run.len() as u64 * (WORK_OF_EXACT_TEST - 1);
             self.push_overlapping(one, run);
-            if self.pairs.len() - from >= BATCH {
+            if self.found.pairs.len() - from >= BATCH {
                 self.keep(from, rule);
-                from = self.pairs.len();
+                from = self.found.pairs.len();
             }
         }
         from
@@ -307,57 +286,34 @@ impl Hits {
 
     /// Appends the pairs of a box with those of a run that overlap it.
     fn push_overlapping(&mut self, one: &Record, run: &[Record]) {
-        let from = self.pairs.len();
-        self.pairs.reserve(run.len() + 1);
+        let from = self.found.pairs.len();
+        self.found.pairs.reserve(run.len() + 1);
         // SAFETY: there is room for a pair of each, and one more to be overwritten.
         unsafe {
-            let start = self.pairs.as_mut_ptr().add(from);
+            let start = self.found.pairs.as_mut_ptr().add(from);
             let mut next = start;
             for other in run {
                 next.write(Pair::new(one.id, other.id));
                 next = next.add(usize::from(one.overlaps(other)));
             }
-            self.pairs.set_len(from + next.offset_from(start) as usize);
+            self.found.pairs.set_len(from + next.offset_from(start) as usize);
         }
-    }
-
-    /// Counts the pairs from `from` on by group.
-    #[inline(always)]
-    fn count_groups(&mut self, from: usize) {
-        if !self.groups.is_empty() {
-            for pair in &self.pairs[from..] {
-                self.groups[(pair.a >> self.group_shift) as usize] += 1;
-            }
-        }
-    }
-
-    /// Takes pairs that were found elsewhere, and leaves other memory for them.
-    pub(crate) fn take(&mut self, pairs: &mut Vec<Pair>) {
-        self.pairs.swap_list(pairs);
-        self.count_groups(0);
-    }
-
-    /// Adds pairs that were found elsewhere.
-    pub(crate) fn add(&mut self, pairs: &[Pair]) {
-        let from = self.pairs.len();
-        self.pairs.extend_from_slice(pairs);
-        self.count_groups(from);
     }
 
     /// Drops the pairs from `from` on whose filters, or keys, do not allow them.
     #[inline(always)]
     fn filter<T>(&mut self, from: usize, by_id: ById<'_, T>, allow: impl Fn(&T, &T) -> bool) {
         let ById { first, second, split } = by_id;
-        let (mut kept, len) = (from, self.pairs.len());
+        let (mut kept, len) = (from, self.found.pairs.len());
         for i in from..len {
-            if let Some(ahead) = self.pairs.get(i + AHEAD) {
+            if let Some(ahead) = self.found.pairs.get(i + AHEAD) {
                 prefetch(first.as_ptr().wrapping_add(ahead.a as usize));
                 prefetch(second.as_ptr().wrapping_add(ahead.b as usize - split));
             }
-            let pair = self.pairs[i];
-            self.pairs[kept] = pair;
+            let pair = self.found.pairs[i];
+            self.found.pairs[kept] = pair;
             kept += usize::from(allow(&first[pair.a as usize], &second[pair.b as usize - split]));
         }
-        self.pairs.truncate(kept);
+        self.found.pairs.truncate(kept);
     }
 }

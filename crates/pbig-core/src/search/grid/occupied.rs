@@ -1,19 +1,9 @@
 //! The occupied cells of a grid, for pictures.
 
 use super::Grid;
-use super::cells::steps_portable;
 use super::spacing::GridPlan;
-use crate::Aabb;
-
-/// A cell of a grid with the boxes whose lower corners lie in it, or a leaf of a tree with its boxes.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct OccupiedCell {
-    /// The cell; a border cell reaches to the lower corners of the boxes beyond the border.
-    pub aabb: Aabb,
-    /// The ids of the boxes.
-    pub ids: Vec<u32>,
-}
+use crate::simd::Portable;
+use crate::{Aabb, OccupiedCell};
 
 /// Sorts boxes into a grid, and returns the cells in which some lie.
 pub(crate) fn occupied_cells(boxes: &[Aabb]) -> Vec<OccupiedCell> {
@@ -35,7 +25,7 @@ impl Grid {
     /// Returns the cell in which the lower corner of a box lies.
     fn cell_around(&self, aabb: &Aabb) -> Aabb {
         let cells = &self.plan.cells;
-        let (low, _) = steps_portable(cells, aabb);
+        let (low, _) = cells.steps(Portable, aabb);
         let edge = cells.edges();
         let min: [f32; 3] = std::array::from_fn(|k| {
             let step = low[k] >> cells.shift << cells.shift;

@@ -1,9 +1,10 @@
 //! Cells and codes never lose an overlapping pair, and every implementation of the inner loops gives the same values.
 
-use super::cells::{Cells, query_of};
-use super::simd::{BLOCK, EightBoxes, Portable, Simd, dispatch};
+use super::cells::Cells;
 use super::spacing::GridPlan;
 use crate::Aabb;
+use crate::simd::query_of;
+use crate::simd::{BLOCK, EightBoxes, Portable, Simd, dispatch};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
@@ -16,8 +17,8 @@ struct Values {
 }
 
 fn values(simd: impl Simd, cells: &Cells, aabb: &Aabb) -> Values {
-    let (low, high) = simd.steps(cells, aabb);
-    Values { takes: simd.takes(cells, aabb), key: simd.key(cells, low), code: simd.code(low, high) }
+    let (low, high) = cells.steps(simd, aabb);
+    Values { takes: cells.takes(simd, aabb), key: cells.key_at(simd, low), code: simd.code(low, high) }
 }
 
 fn may_overlap(simd: impl Simd, code: u64, codes: &[u64; BLOCK]) -> u32 {

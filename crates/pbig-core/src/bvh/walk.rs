@@ -4,7 +4,7 @@ use super::BoxIndex;
 use super::node::{LANES, Lanes, next};
 use super::query::{Cast, Near, Query};
 use crate::Aabb;
-use crate::grid::{Eight, Simd};
+use crate::simd::{Eight, Simd};
 use arrayvec::ArrayVec;
 
 /// Maximum number of nodes that wait: seven for each level and one more, and 2^32 boxes of 448 classes make 14 levels.

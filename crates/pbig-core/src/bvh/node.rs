@@ -1,29 +1,29 @@
 //! A node: eight boxes, axis by axis, and what each stands for.
 
 use crate::Aabb;
-use crate::grid::{BLOCK, EightBoxes, Simd};
+use crate::simd::{BLOCK, EightBoxes, Simd};
 
 /// Boxes in a node.
-pub(super) const LANES: usize = BLOCK;
+pub(crate) const LANES: usize = BLOCK;
 
 /// A number for each box of a node.
-pub(super) type Lanes = [f32; LANES];
+pub(crate) type Lanes = [f32; LANES];
 
 /// The child of an empty lane.
-pub(super) const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Eight boxes: of stored boxes (a leaf), or of nodes.
 #[repr(C, align(32))]
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Node {
+pub(crate) struct Node {
     /// In an empty lane, corners are at plus and minus infinity, which only an infinite box meets.
-    pub(super) boxes: EightBoxes,
+    pub(crate) boxes: EightBoxes,
     /// Ids of boxes in a leaf, else numbers of nodes.
-    pub(super) children: [u32; LANES],
+    pub(crate) children: [u32; LANES],
 }
 
 impl Node {
-    pub(super) const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         boxes: [
             [f32::INFINITY; LANES],
             [f32::INFINITY; LANES],
@@ -37,7 +37,7 @@ impl Node {
 
     /// Stores a box. An invalid one becomes an empty box, which meets nothing.
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, aabb: &Aabb) {
+    pub(crate) fn set(&mut self, lane: usize, aabb: &Aabb) {
         let is_valid = aabb.is_valid();
         for k in 0..3 {
             self.boxes[k][lane] = if is_valid { aabb.min[k] } else { f32::INFINITY };
@@ -47,7 +47,7 @@ impl Node {
 
     /// Returns the box in a lane; where there is none, an empty one, which only an infinite box overlaps.
     #[inline(always)]
-    pub(super) fn get(&self, lane: usize) -> Aabb {
+    pub(crate) fn get(&self, lane: usize) -> Aabb {
         let mut aabb = Aabb::NOWHERE;
         for k in 0..3 {
             (aabb.min[k], aabb.max[k]) = (self.boxes[k][lane], self.boxes[k + 3][lane]);
@@ -57,7 +57,7 @@ impl Node {
 
     /// Returns by how much the sum of the extents in a lane grows with a box.
     #[inline(always)]
-    pub(super) fn growth(&self, lane: usize, aabb: &Aabb) -> f32 {
+    pub(crate) fn growth(&self, lane: usize, aabb: &Aabb) -> f32 {
         let below = |k: usize| (self.boxes[k][lane] - aabb.min[k]).max(0.0);
         let above = |k: usize| (aabb.max[k] - self.boxes[k + 3][lane]).max(0.0);
         (0..3).map(|k| below(k) + above(k)).sum()
@@ -65,19 +65,19 @@ impl Node {
 
     /// Returns true if a lane has a box.
     #[inline(always)]
-    pub(super) fn has(&self, lane: usize) -> bool {
+    pub(crate) fn has(&self, lane: usize) -> bool {
         self.boxes[0][lane] <= self.boxes[3][lane]
     }
 
     /// Returns a bit for each lane that has a box.
     #[inline(always)]
-    pub(super) fn used(&self, simd: impl Simd) -> u32 {
+    pub(crate) fn used(&self, simd: impl Simd) -> u32 {
         simd.at_most(&self.boxes[0], &self.boxes[3])
     }
 }
 
 /// Returns the sum of a box's extents; zero for an invalid one.
-pub(super) fn extent_sum(aabb: &Aabb) -> f32 {
+pub(crate) fn extent_sum(aabb: &Aabb) -> f32 {
     if !aabb.is_valid() {
         return 0.0;
     }
@@ -86,7 +86,7 @@ pub(super) fn extent_sum(aabb: &Aabb) -> f32 {
 
 /// Takes the lowest bit out of a mask, and returns its number.
 #[inline(always)]
-pub(super) fn next(mask: &mut u32) -> Option<usize> {
+pub(crate) fn next(mask: &mut u32) -> Option<usize> {
     let lane = mask.trailing_zeros() as usize;
     let is_any = *mask != 0;
     *mask &= mask.wrapping_sub(1);

@@ -9,7 +9,6 @@
 
 #![allow(clippy::needless_range_loop, reason = "a lane of several arrays")]
 
-mod join;
 mod node;
 mod query;
 mod refit;
@@ -18,10 +17,11 @@ mod sort;
 pub(crate) mod tests;
 mod walk;
 
-use crate::grid::{Simd, dispatch};
-use crate::policy::index as policy;
+use crate::policy::bvh as policy;
+use crate::simd::{Simd, dispatch};
 use crate::{Aabb, OccupiedCell};
-use node::{LANES, Node};
+use node::Node;
+pub(crate) use node::{LANES, NONE, next};
 use query::Cast;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -49,14 +49,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[derive(Clone, Debug, Default)]
 pub struct BoxIndex {
     /// Leaves first, then their parents, and so on up to the root; then loose leaves, which hold boxes that came since the sort.
-    nodes: Vec<Node>,
-    leaves: u32,
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) leaves: u32,
     /// One more than the root's number; 0 if there is none.
-    end: u32,
+    pub(crate) end: u32,
     /// By node: the lane in which its parent has it (node times eight plus lane), or `NONE`.
     parents: Vec<u32>,
     /// By node: the box around its boxes.
-    bounds: Vec<Aabb>,
+    pub(crate) bounds: Vec<Aabb>,
     /// By node: free lanes of a leaf; 1 for any other.
     room: Vec<u8>,
     /// By node: the sum of its extents at the last sort; infinite once it has grown past twice that.
@@ -173,12 +173,12 @@ impl BoxIndex {
     }
 
     #[inline(always)]
-    fn root(&self) -> Option<u32> {
+    pub(crate) fn root(&self) -> Option<u32> {
         self.end.checked_sub(1)
     }
 
     #[inline(always)]
-    fn is_leaf(&self, node: u32) -> bool {
+    pub(crate) fn is_leaf(&self, node: u32) -> bool {
         node < self.leaves || node >= self.end
     }
 

@@ -1,12 +1,12 @@
 //! The most work that a search can take, known before it: the rows and slots that each box visits are.
 
 use super::Grid;
-use super::search::Sorted;
-use super::simd::{Simd, dispatch};
-use super::spacing::NeighbourScan;
-use crate::budget::Budget;
+use super::scan::Sorted;
+use crate::NeighbourScan;
 use crate::parallel::{run, threads_for};
 use crate::policy::search::{WORK_OF_EXACT_TEST, WORK_OF_ROW, WORK_OF_RUNS, WORK_OF_VAGUE_TEST};
+use crate::search::Budget;
+use crate::simd::{Simd, dispatch};
 use std::ops::Range;
 
 /// Boxes that are counted together.
@@ -72,7 +72,7 @@ fn in_runs(grid: &Grid, slot: usize) -> u64 {
 fn in_window<const WRAPS: bool>(simd: impl Simd, sorted: &Sorted<'_>, slot: usize) -> u64 {
     let grid = sorted.searched();
     let cells = &grid.plan.cells;
-    let (low, high) = simd.steps(cells, &sorted.own.records[slot].aabb);
+    let (low, high) = cells.steps(simd, &sorted.own.records[slot].aabb);
     let window = cells.window(low, high);
     let mut work = 0;
     for z in window.low[2]..=window.high[2] {

@@ -2,14 +2,15 @@
 //! first or whose cell is lower.
 
 use super::Grid;
-use super::cells::{Cells, Window, query_of, steps_portable};
-use super::hits::{CHARGED_FROM, HIT_ROOM, HitWriter, Hits, Rule};
-use super::record::Record;
-use super::simd::{BLOCK, Simd, dispatch};
-use super::spacing::NeighbourScan;
+use super::cells::{Cells, Window};
 use crate::Aabb;
+use crate::NeighbourScan;
 use crate::parallel::run_with;
 use crate::policy::search::{WORK_OF_ROW, WORK_OF_RUNS};
+use crate::search::hits::{CHARGED_FROM, HIT_ROOM, HitWriter, Hits, Rule};
+use crate::search::record::Record;
+use crate::simd::{BLOCK, Simd, dispatch};
+use crate::simd::{Portable, query_of};
 use std::ops::Range;
 
 /// Number of boxes in a piece of work. It does not follow the threads, because the work of a piece is charged to the budget.
@@ -84,7 +85,7 @@ impl<'a> Sorted<'a> {
             return;
         }
         let (one, grid, others) = self.oversize(i);
-        let mut from = hits.pairs.len();
+        let mut from = hits.found.pairs.len();
         grid.reached_by(&one.aabb, |run| {
             let (first, end) = grid.slots(run);
             hits.extra += WORK_OF_ROW;
@@ -233,7 +234,7 @@ impl<S: Simd> Scan<'_, '_, S> {
                 break;
             }
             let record: &Record = &self.grid.records[slot];
-            let (low, high) = self.simd.steps(&cells, &record.aabb);
+            let (low, high) = cells.steps(self.simd, &record.aabb);
             let (one, window) =
                 (Seeker { slot, query: query_of(self.simd.code(low, high)) }, cells.window(low, high));
             let own: [i32; 3] = std::array::from_fn(|k| {
@@ -264,7 +265,7 @@ impl<S: Simd> Scan<'_, '_, S> {
             if self.is_over() {
                 break;
             }
-            let (low, high) = self.simd.steps(&cells, &self.own.records[slot].aabb);
+            let (low, high) = cells.steps(self.simd, &self.own.records[slot].aabb);
             let one = Seeker { slot, query: query_of(self.simd.code(low, high)) };
             let window = cells.window(low, high);
             if !WRAPS && window.high[1] - window.low[1] < 2 && window.high[2] - window.low[2] < 2 {
@@ -330,7 +331,7 @@ impl Grid {
     /// Visits the cells in which boxes can lie that overlap a box of any size.
     pub(super) fn reached_by(&self, aabb: &Aabb, mut visit: impl FnMut(KeyRun)) {
         let cells = &self.plan.cells;
-        let (low, high) = steps_portable(cells, aabb);
+        let (low, high) = cells.steps(Portable, aabb);
         let window = cells.window(low, high).clipped(cells);
         for z in window.low[2]..=window.high[2] {
             if cells.are_whole_rows(&window) {

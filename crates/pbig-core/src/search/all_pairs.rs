@@ -1,17 +1,16 @@
 //! All pairs of a list of boxes, or those of two sets: by grids, by a tree where a grid would test too many, or by testing every
 //! pair of a few.
 
-use crate::budget::Budget;
-use crate::device_slot::DeviceSlot;
-use crate::grid::{ById, Grid, GridPlan, Hits, Receiver, Rule, TwoGrids, brute_force, brute_force_across};
-use crate::index::BoxIndex;
+use super::brute::{brute_force, brute_force_across};
+use super::grid::{Grid, GridPlan, TwoGrids};
+use super::hits::{ById, Hits, Receiver, Rule};
+use super::{Budget, DeviceSlot, End, Outcome, join, streamed};
+use crate::bvh::BoxIndex;
 use crate::memory::{Scratch, ShrinkingVec};
-use crate::outcome::{End, Outcome};
 use crate::pairs::{Grouping, Groups};
 use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
 use crate::report::{Checks, Clock, stage};
-use crate::streamed;
 use crate::{Aabb, Algorithm, Backend, Boxes, Config, Engine, Keys, Pair, Plan, ProxyFilter, SearchRequest};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -156,7 +155,7 @@ impl AllPairs {
     fn begin(&mut self, request: &Request<'_>) {
         let workers = Self::workers(request.count());
         self.hits.resize_with(workers, Hits::default);
-        self.hits.iter_mut().for_each(|hits| hits.begin_for(request.grouping));
+        self.hits.iter_mut().for_each(|hits| hits.begin(request.grouping));
     }
 
     fn test_all(&mut self, request: &Request<'_>, rule: &Rule<'_>, outcome: &mut Outcome) {
@@ -206,7 +205,7 @@ impl AllPairs {
             }
         };
         outcome.stages.map += clock.lap();
-        outcome.plan = Plan::of_grid(&plan, sorted.boxes(), sorted.oversize_count());
+        outcome.plan = plan.told(sorted.boxes(), sorted.oversize_count());
         stage!("check");
         let most = search::grid_up_to_work(sorted.boxes());
         let is_sure = request.config.engine == Some(Engine::Grid)
@@ -239,7 +238,7 @@ impl AllPairs {
         let is_sure = request.config.engine == Some(Engine::Tree);
         let most = search::join_up_to_work(tree.len());
         let is_done = self.run_within((!is_sure).then_some(most), request, rule, outcome, |rule, hits| {
-            tree.find_pairs(split, rule, hits);
+            join::find_pairs(tree, split, rule, hits);
         });
         if !is_done {
             streamed::find_pairs(boxes, split, rule, &mut self.hits);
@@ -279,13 +278,13 @@ impl AllPairs {
     /// Gathers what was found, for sorting.
     pub(crate) fn gather(&mut self, grouping: Grouping, groups: &mut Groups) -> usize {
         let workers = self.hits.len();
-        groups.gather(grouping, &mut self.hits, workers)
+        groups.gather(grouping, self.hits.iter_mut().map(|hits| &mut hits.found).collect(), workers)
     }
 
     /// Forgets the pairs, and gives memory back if as many are expected.
     pub(crate) fn settle(&mut self, pairs: usize) {
         let share = pairs / self.hits.len().max(1);
-        self.hits.iter_mut().for_each(|hits| hits.settle(share));
+        self.hits.iter_mut().for_each(|hits| hits.found.settle(share));
         self.answer.clear();
         self.answer.settle(pairs);
     }
@@ -313,20 +312,20 @@ impl AllPairs {
     /// Takes pairs that a device has found. Several threads copy and count them.
     pub(crate) fn take(&mut self, pairs: &mut Vec<Pair>, grouping: Option<Grouping>) {
         self.hits.resize_with(Self::workers(pairs.len()), Hits::default);
-        self.hits.iter_mut().for_each(|hits| hits.begin_for(grouping));
+        self.hits.iter_mut().for_each(|hits| hits.begin(grouping));
         if let [hits] = &mut self.hits[..] {
-            return hits.take(pairs);
+            return hits.found.take(pairs);
         }
         let pieces = pairs.len().div_ceil(PARALLEL_FROM_BOXES);
         run_with(&mut self.hits, pieces, |hits, piece| {
-            hits.add(&pairs[piece_range(pairs.len(), piece, pieces)]);
+            hits.found.add(&pairs[piece_range(pairs.len(), piece, pieces)]);
         });
     }
 
     /// Copies all pairs into one list, in no particular order.
     pub(crate) fn list(&mut self, pairs: &mut Vec<Pair>) {
         pairs.clear();
-        pairs.reserve(self.hits.iter().map(|hits| hits.pairs.len()).sum());
-        self.hits.iter().for_each(|hits| pairs.extend_from_slice(&hits.pairs));
+        pairs.reserve(self.hits.iter().map(|hits| hits.found.pairs.len()).sum());
+        self.hits.iter().for_each(|hits| pairs.extend_from_slice(&hits.found.pairs));
     }
 }

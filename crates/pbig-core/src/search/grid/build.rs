@@ -4,13 +4,14 @@
 //! while it is in the cache, and computes codes. Each pass is shared by threads piece by piece.
 
 use super::Grid;
-use super::cells::{Cells, TOMBSTONE};
-use super::record::Record;
-use super::search::Sorted;
-use super::simd::{BLOCK, Simd, dispatch};
+use super::cells::Cells;
+use super::scan::Sorted;
 use super::spacing::GridPlan;
 use crate::Aabb;
 use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run};
+use crate::search::record::Record;
+use crate::simd::TOMBSTONE;
+use crate::simd::{BLOCK, Simd, dispatch};
 use std::ops::Range;
 
 /// Maximum number of buckets of the first sort: their write positions stay in the nearest cache.
@@ -195,8 +196,8 @@ fn count_keys(
     shift: u32,
 ) {
     for (aabb, to) in boxes.iter().zip(keys) {
-        let takes = simd.takes(&cells, aabb);
-        let mut key = simd.key(&cells, simd.steps(&cells, aabb).0);
+        let takes = cells.takes(simd, aabb);
+        let mut key = cells.key_at(simd, cells.steps(simd, aabb).0);
         let mut bucket = 0;
         if takes {
             bucket += (key >> shift) as usize;
@@ -261,7 +262,7 @@ fn sort_bucket(simd: impl Simd, sort: &SortBuckets<'_>, slots: Range<usize>, key
     }
     for record in bucket {
         let place = &mut ends[record.key as usize - keys.start];
-        let (low, high) = simd.steps(&cells, &record.aabb);
+        let (low, high) = cells.steps(simd, &record.aabb);
         let (slot, code) = (*place as usize - slots.start, simd.code(low, high));
         (records[slot], codes[slot]) = (*record, code);
         *place += 1;

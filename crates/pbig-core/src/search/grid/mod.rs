@@ -7,37 +7,24 @@
 //! A search visits half of each box's neighbouring cells as contiguous runs of slots, tests 64-bit codes (`cells`), and
 //! tests exactly what these leave over.
 
-#[cfg(target_arch = "x86_64")]
-mod avx2;
 pub(crate) mod bounds;
-mod brute;
 mod build;
 mod cells;
 mod count;
-mod hits;
 mod occupied;
-mod record;
-mod search;
-mod simd;
+mod scan;
 mod spacing;
 #[cfg(test)]
 mod tests;
 
-#[cfg(target_arch = "x86_64")]
-pub(crate) use avx2::Avx2;
-pub(crate) use brute::{brute_force, brute_force_across};
-pub(crate) use build::TwoGrids;
-pub(crate) use hits::{ById, Hits, Receiver, Rule};
-pub use occupied::OccupiedCell;
+pub(super) use build::TwoGrids;
 pub(crate) use occupied::occupied_cells;
-pub use simd::simd;
-pub(crate) use simd::{BLOCK, Eight, EightBoxes, Portable, Simd, dispatch, prefetch};
 pub(crate) use spacing::GridPlan;
-pub use spacing::NeighbourScan;
 
+use super::record::Record;
 use crate::memory::{Scratch, ShrinkingVec};
+use crate::simd::BLOCK;
 use build::BucketCounts;
-use record::Record;
 
 /// A grid with its buffers.
 #[derive(Clone, Debug, Default)]

@@ -3,11 +3,11 @@
 //! The eight boxes of a leaf lie near each other and have one size and shape, because the tree is cut at medians, along the axis on
 //! which boxes lie apart most, and has a part for each class. So a leaf looks at few nodes.
 
-use super::BoxIndex;
-use super::node::{LANES, NONE, next};
-use crate::grid::{Hits, Rule, Simd, dispatch};
+use super::hits::{Hits, Rule};
+use crate::bvh::{BoxIndex, LANES, NONE, next};
 use crate::parallel::run_with;
 use crate::policy::search::WORK_OF_NODE;
+use crate::simd::{Simd, dispatch};
 use crate::{Aabb, Pair};
 use std::ops::Range;
 
@@ -20,37 +20,34 @@ const BATCH: usize = 4096;
 /// Maximum number of boxes that are tested at once, without a look at the bounds of their leaf.
 const FEW_LANES: u32 = 3;
 
-impl BoxIndex {
-    /// Returns the number of leaves that are joined with others, and the first of these.
-    fn joined(&self, split: Option<u32>) -> (u32, u32) {
-        let Some(split) = split else { return (self.leaves, 0) };
-        let leaves = &self.nodes[..self.leaves as usize];
-        let second_set = leaves.partition_point(|leaf| leaf.children[0] < split) as u32;
-        (second_set, second_set)
-    }
+/// Finds all pairs of the boxes as of the last sort, into the lists of as many threads as there are `hits`; with a `split`, those
+/// of a box with an id below it and one with another id, as of the last [`BoxIndex::sort_sets`].
+pub(super) fn find_pairs(index: &BoxIndex, split: Option<u32>, rule: &Rule<'_>, hits: &mut [Hits]) {
+    let (leaves, earliest) = joined(index, split);
+    let (last_leaves, leaves) = (last_leaves(index), leaves as usize);
+    run_with(hits, leaves.div_ceil(PIECE), |hits, piece| {
+        let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
+        let join = &mut Join { index, last_leaves: &last_leaves, earliest, rule, hits };
+        dispatch!(Join::meet_all, join, leaves.clone());
+    });
+}
 
-    /// Finds all pairs of the boxes as of the last sort, into the lists of as many threads as there are `hits`; with a `split`, those
-    /// of a box with an id below it and one with another id, as of the last [`BoxIndex::sort_sets`].
-    pub(crate) fn find_pairs(&self, split: Option<u32>, rule: &Rule<'_>, hits: &mut [Hits]) {
-        debug_assert!(self.loose().is_empty());
-        let (leaves, earliest) = self.joined(split);
-        let (last_leaves, leaves) = (self.last_leaves(), leaves as usize);
-        run_with(hits, leaves.div_ceil(PIECE), |hits, piece| {
-            let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
-            let join = &mut Join { index: self, last_leaves: &last_leaves, earliest, rule, hits };
-            dispatch!(Join::meet_all, join, leaves.clone());
-        });
-    }
+/// Returns the number of leaves that are joined with others, and the first of these.
+fn joined(index: &BoxIndex, split: Option<u32>) -> (u32, u32) {
+    let Some(split) = split else { return (index.leaves, 0) };
+    let leaves = &index.nodes[..index.leaves as usize];
+    let second_set = leaves.partition_point(|leaf| leaf.children[0] < split) as u32;
+    (second_set, second_set)
+}
 
-    /// Returns the last leaf below each node.
-    fn last_leaves(&self) -> Vec<u32> {
-        let mut last: Vec<u32> = (0..self.end).collect();
-        for node in self.leaves..self.end {
-            let children = self.nodes[node as usize].children.iter().filter(|child| **child != NONE);
-            last[node as usize] = children.map(|child| last[*child as usize]).max().unwrap_or(0);
-        }
-        last
+/// Returns the last leaf below each node.
+fn last_leaves(index: &BoxIndex) -> Vec<u32> {
+    let mut last: Vec<u32> = (0..index.end).collect();
+    for node in index.leaves..index.end {
+        let children = index.nodes[node as usize].children.iter().filter(|child| **child != NONE);
+        last[node as usize] = children.map(|child| last[*child as usize]).max().unwrap_or(0);
     }
+    last
 }
 
 struct Join<'a, 'b> {
@@ -82,16 +79,16 @@ impl Join<'_, '_> {
         let index = self.index;
         let bounds = index.bounds[leaf as usize];
         let earliest = leaf.max(self.earliest);
-        let mut from = self.hits.pairs.len();
+        let mut from = self.hits.found.pairs.len();
         waiting.extend(index.root());
         while let Some(at) = waiting.pop() {
             self.hits.extra += WORK_OF_NODE;
             if index.is_leaf(at) {
                 self.test(simd, leaf, at, &bounds);
                 // Boxes as large as the world meet all others.
-                if self.hits.pairs.len() >= from + BATCH {
+                if self.hits.found.pairs.len() >= from + BATCH {
                     self.hits.keep(from, self.rule);
-                    from = self.hits.pairs.len();
+                    from = self.hits.found.pairs.len();
                 }
                 continue;
             }
@@ -127,9 +124,54 @@ impl Join<'_, '_> {
             let mut met = simd.overlaps_eight(&other.boxes, &aabb) & wanted;
             while let Some(hit) = next(&mut met) {
                 if one.has(lane) && other.has(hit) {
-                    self.hits.pairs.push(Pair::new(one.children[lane], other.children[hit]));
+                    self.hits.found.pairs.push(Pair::new(one.children[lane], other.children[hit]));
                 }
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::oracle;
+    use rand::rngs::StdRng;
+    use rand::{RngExt, SeedableRng};
+    use std::sync::atomic::AtomicU64;
+
+    /// Returns all pairs that a sorted index finds on this number of threads.
+    fn joined(boxes: &[Aabb], threads: usize) -> Vec<Pair> {
+        let mut index = BoxIndex::default();
+        index.sort(boxes);
+        let found = AtomicU64::new(0);
+        let rule = Rule::listing(None, &found);
+        let mut hits = vec![Hits::default(); threads];
+        hits.iter_mut().for_each(|hits| hits.begin(None));
+        find_pairs(&index, None, &rule, &mut hits);
+        let mut pairs: Vec<Pair> = hits.iter().flat_map(|hits| hits.found.pairs.iter().copied()).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    #[test]
+    fn a_join_finds_the_pairs_of_the_oracle() {
+        let mut random = StdRng::seed_from_u64(5);
+        for n in (0..100).chain([1000, 20_000]) {
+            let width = (n as f32).cbrt() * 1.5;
+            let mut boxes: Vec<Aabb> = (0..n)
+                .map(|i| {
+                    let size = 2f32.powi(i % 7 * (i % 3) - 3);
+                    let half = [size, 1.0, 0.3].map(|half| half * random.random_range(0.2..0.5));
+                    Aabb::from_center([0; 3].map(|_| random.random_range(0.0..=width)), half)
+                })
+                .collect();
+            let odd = [
+                Aabb::NOWHERE,
+                Aabb::new([1.0; 3], [0.0; 3]),
+                Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]),
+            ];
+            boxes.iter_mut().skip(5).step_by(41).zip(odd.iter().cycle()).for_each(|(to, odd)| *to = *odd);
+            assert_eq!(joined(&boxes, 1 + n as usize % 3), oracle::pairs(&boxes), "{n} boxes");
         }
     }
 }
