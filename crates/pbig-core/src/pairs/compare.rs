@@ -45,7 +45,8 @@ impl Comparison {
         next.pool.resize(count, 0);
         self.parts.resize_with(grouping.count, Part::default);
         let parts = SharedSlice::new(&mut self.parts);
-        let (spans, pool) = (SharedSlice::new(&mut next.spans), SharedSlice::new(&mut next.pool));
+        let Rows { spans, pool } = &mut *next;
+        let (spans, pool) = (SharedSlice::new(spans), SharedSlice::new(pool));
         let old = &kept.forward;
         found.for_each(workers, |found, sorter, group| {
             let (ids, places) = (grouping.ids_of(group), found.range(group));

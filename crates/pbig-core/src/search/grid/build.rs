@@ -221,7 +221,7 @@ fn scatter_records(
     keys: &[u32],
     first_id: u32,
     next: &mut [u32],
-    coarse: SharedSlice<Record>,
+    coarse: SharedSlice<'_, Record>,
     shift: u32,
 ) {
     for ((aabb, &key), id) in boxes.iter().zip(keys).zip(first_id..) {
@@ -237,10 +237,10 @@ fn scatter_records(
 struct SortBuckets<'a> {
     plan: GridPlan,
     coarse: &'a [Record],
-    records: SharedSlice<Record>,
-    codes: SharedSlice<u64>,
+    records: SharedSlice<'a, Record>,
+    codes: SharedSlice<'a, u64>,
     /// By cell: where it ends.
-    ends: SharedSlice<u32>,
+    ends: SharedSlice<'a, u32>,
 }
 
 /// Sorts a bucket by cell, and computes its codes.
