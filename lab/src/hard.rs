@@ -1,4 +1,4 @@
-//! Times of hard worlds, on which a grid of one cell size takes quadratic time, and of hard histories of edits.
+//! Times of hard worlds, on which a grid of one cell size takes quadratic time, and of hard histories of updates.
 
 use pbig_core::{Aabb, BroadPhase, Config, Engine, Finder};
 use pbig_harness::hard::{History, histories, shapes, tell};

@@ -29,11 +29,11 @@ impl LookUp {
     /// Brings the tree up to date, and leaves the events of an update in the task. Gives up if it takes too much work.
     pub(super) fn run(&mut self, task: &mut Task<'_>, tree: &mut Tree) -> Outcome {
         let (world, mut clock, mut outcome) = (task.world, Clock::start(), Outcome::default());
-        let followed = {
+        let refreshed = {
             stage!("map");
-            tree.follow(world)
+            tree.refresh_sorted(world)
         };
-        let Some((index, read)) = followed else {
+        let Some((index, read)) = refreshed else {
             return Outcome { work: world.changed.len() as u64, ..outcome };
         };
         index.in_order(&world.changed, &mut self.order);

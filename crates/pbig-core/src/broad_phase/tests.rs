@@ -263,7 +263,7 @@ fn finders_and_broad_phases_can_be_sent_and_shared() {
 }
 
 #[test]
-fn pairs_of_a_removed_box_end_for_the_other_in_a_rebuild() {
+fn pairs_of_a_removed_box_end_for_the_other_in_a_search() {
     let mut broad_phase = BroadPhase::default();
     let at = |i: u32, x: f32| Aabb::from_center([0.9 * i as f32 + x, 0.0, 0.0], [0.5; 3]);
     (0..3000).for_each(|i| broad_phase.set(3 * i, at(i, 0.0), ProxyFilter::ALL).expect("few boxes"));

@@ -107,13 +107,13 @@ impl Tree {
         let stale = std::mem::take(&mut *self.stale.lock().unwrap_or_else(PoisonError::into_inner));
         let Stale { mut index, mut changed, knows_changes } = stale;
         changed.extend_from_slice(&world.changed);
-        index.renew(&world.boxes, knows_changes.then_some(&changed), world.present.iter());
+        index.refresh_present(&world.boxes, knows_changes.then_some(&changed), world.present.iter());
         Fresh::new(index, changed)
     }
 
     /// Makes the tree fresh, with its boxes sorted, for look-ups of the changed ones. Returns it, and how many boxes were read; none, and
     /// leaves the tree as it is, if too many boxes came or have jumped.
-    pub(super) fn follow(&mut self, world: &World) -> Option<(&BoxIndex, usize)> {
+    pub(super) fn refresh_sorted(&mut self, world: &World) -> Option<(&BoxIndex, usize)> {
         self.make_stale();
         let stale = self.stale_mut();
         let before = stale.changed.len();
@@ -124,7 +124,7 @@ impl Tree {
             stale.changed.truncate(before);
             return None;
         }
-        let read = stale.index.follow(&world.boxes, known, world.present.iter());
+        let read = stale.index.refresh_sorted(&world.boxes, known, world.present.iter());
         let Stale { index, changed, .. } = std::mem::take(stale);
         let fresh = Fresh::new(index, changed);
         Some((&self.fresh.get_or_init(|| fresh).index, read))

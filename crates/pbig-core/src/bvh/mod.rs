@@ -1,15 +1,16 @@
-//! An index of boxes for queries: rays, moving boxes, boxes, points.
+//! The tree (a bounding volume hierarchy) of boxes: for rays, moving boxes, boxes, points, and for a search of all pairs.
 //!
 //! ```text
-//! boxes by id ─► sort (rarely) ─► nodes of eight boxes, eight nodes, ... ◄─ refit (before a query, if boxes moved)
+//! boxes by id ─► sort (rarely) ─► nodes of eight boxes, eight nodes, ... ◄─ place (few changed), refit (many)
 //! ```
 //!
-//! A tree of nodes with eight children each. It is refitted in one pass over its nodes, children first. Sorting is left until
-//! queries have looked at enough nodes for a sort to pay.
+//! Each node has eight children. A refit is one pass over the nodes, children first. Sorting is left until queries have looked at
+//! enough nodes for a sort to pay.
 
 #![allow(clippy::needless_range_loop, reason = "a lane of several arrays")]
 
 mod node;
+mod place;
 mod query;
 mod refit;
 mod sort;

@@ -26,21 +26,21 @@ impl BoxIndex {
     pub fn refresh(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
         let gone = boxes.len() as u32..self.known as u32;
         if changed.is_none() || gone.is_empty() {
-            self.renew(boxes, changed, 0..boxes.len() as u32);
+            self.refresh_present(boxes, changed, 0..boxes.len() as u32);
             return;
         }
         let changed: Vec<u32> = changed.unwrap_or_default().iter().copied().chain(gone).collect();
-        self.renew(boxes, Some(&changed), 0..boxes.len() as u32);
+        self.refresh_present(boxes, Some(&changed), 0..boxes.len() as u32);
     }
 
     /// As [`BoxIndex::refresh`]; no id but the `present` ones has a box. Returns the number of boxes that were read.
-    pub(crate) fn renew(
+    pub(crate) fn refresh_present(
         &mut self,
         boxes: &[Aabb],
         changed: Option<&[u32]>,
         present: impl Iterator<Item = u32> + Clone,
     ) -> usize {
-        let read = self.read(boxes, changed, present.clone());
+        let read = self.update(boxes, changed, present.clone());
         if !self.wants_sort() && !self.has_many_loose() {
             return read;
         }
@@ -49,8 +49,8 @@ impl BoxIndex {
         read + self.listed
     }
 
-    /// As [`BoxIndex::renew`], and leaves the boxes sorted.
-    pub(crate) fn follow(
+    /// As [`BoxIndex::refresh_present`], and leaves the boxes sorted.
+    pub(crate) fn refresh_sorted(
         &mut self,
         boxes: &[Aabb],
         changed: Option<&[u32]>,
@@ -58,7 +58,7 @@ impl BoxIndex {
     ) -> usize {
         let mut read = 0;
         if self.is_sorted {
-            read = self.read(boxes, changed, present.clone());
+            read = self.update(boxes, changed, present.clone());
         }
         let is_bad = self.sort_after.is_some_and(|nodes| self.looked_up >= nodes);
         if !self.is_sorted || is_bad || self.has_many_loose() {
@@ -69,12 +69,17 @@ impl BoxIndex {
     }
 
     /// Reads the changed boxes, if they are few, or all. Returns the number of boxes that were read.
-    fn read(&mut self, boxes: &[Aabb], changed: Option<&[u32]>, present: impl Iterator<Item = u32>) -> usize {
+    fn update(
+        &mut self,
+        boxes: &[Aabb],
+        changed: Option<&[u32]>,
+        present: impl Iterator<Item = u32>,
+    ) -> usize {
         self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
         let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < boxes.len();
         let few = changed.filter(is_few);
         match few {
-            Some(changed) => self.take(boxes, changed),
+            Some(changed) => self.place(boxes, changed),
             None => self.refit(boxes, present),
         }
         self.known = boxes.len();
@@ -87,55 +92,6 @@ impl BoxIndex {
         self.loose().len() > policy::loose_leaves(self.leaves)
     }
 
-    /// Returns how many of some boxes came or have jumped: these need new places.
-    pub(crate) fn arrivals(&self, boxes: &[Aabb], ids: &[u32]) -> usize {
-        let place = |id: u32| self.places.get(id as usize).copied().unwrap_or(NONE);
-        let aabb = |id: u32| boxes.get(id as usize).filter(|aabb| aabb.is_valid());
-        let has_arrived = |id: &&u32| aabb(**id).is_some_and(|aabb| !self.is_near(place(**id), aabb));
-        if self.is_sorted { ids.iter().filter(has_arrived).count() } else { 0 }
-    }
-
-    /// Reads few boxes. Those that came, and those that have jumped, get places near others.
-    fn take(&mut self, boxes: &[Aabb], ids: &[u32]) {
-        let mut order = std::mem::take(&mut self.order);
-        order.clear();
-        for &id in ids {
-            let place = self.places.get(id as usize).copied().unwrap_or(NONE);
-            let aabb = boxes.get(id as usize).filter(|aabb| aabb.is_valid());
-            let stays = aabb.is_some_and(|aabb| self.is_near(place, aabb));
-            if place != NONE && !stays {
-                self.leave(place);
-                self.places[id as usize] = NONE;
-                order.push(word(place, NONE));
-            }
-            if let Some(aabb) = aabb {
-                if !stays {
-                    self.add(id, aabb);
-                }
-                order.push(word(self.places[id as usize], id));
-            }
-        }
-        order.sort_unstable();
-        dispatch!(Self::put_all, self, boxes, &order);
-        self.order = order;
-    }
-
-    /// Frees a lane. Its box is still there.
-    fn leave(&mut self, place: u32) {
-        let leaf = place as usize / LANES;
-        self.nodes[leaf].children[place as usize % LANES] = NONE;
-        self.room[leaf] += 1;
-    }
-
-    /// Returns true if a box is still near the place that it has: it meets the bounds of the node above its leaf.
-    fn is_near(&self, place: u32, aabb: &Aabb) -> bool {
-        if place == NONE {
-            return false;
-        }
-        let above = self.parents[place as usize / LANES];
-        above == NONE || self.bounds[above as usize / LANES].overlaps(aabb)
-    }
-
     /// Writes ids in the order of their places: place and id in one word.
     pub(crate) fn in_order(&self, ids: &[u32], order: &mut Vec<u64>) {
         order.clear();
@@ -146,7 +102,7 @@ impl BoxIndex {
 
     /// Stores boxes in their places, and passes the bounds of their nodes on, level by level.
     #[inline(always)]
-    fn put_all(simd: impl Simd, index: &mut Self, boxes: &[Aabb], order: &[u64]) {
+    pub(super) fn put_all(simd: impl Simd, index: &mut Self, boxes: &[Aabb], order: &[u64]) {
         let mut nodes = std::mem::take(&mut index.level);
         nodes.clear();
         for word in order {
@@ -251,7 +207,7 @@ impl BoxIndex {
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         let has_come = |id: &u32| self.places[*id as usize] == NONE && boxes[*id as usize].is_valid();
         let came: Vec<u32> = present.filter(has_come).collect();
-        self.take(boxes, &came);
+        self.place(boxes, &came);
     }
 
     /// Reads the boxes of all leaves, then those of the other nodes, children first.
@@ -272,53 +228,7 @@ impl BoxIndex {
         self.grown += grown.map(usize::from).sum::<usize>();
     }
 
-    /// Gives a box a place near others, or in the loose leaves.
-    fn add(&mut self, id: u32, aabb: &Aabb) {
-        if self.places.len() <= id as usize {
-            self.places.resize(id as usize + 1, NONE);
-        }
-        if let Some(leaf) = self.leaf_with_room(aabb) {
-            return self.put(leaf, id, aabb);
-        }
-        let last = self.nodes.len().checked_sub(1).filter(|last| *last >= self.end as usize);
-        let open = last.filter(|last| self.room[*last] > 0);
-        let at = open.unwrap_or_else(|| {
-            self.push(Node::EMPTY);
-            self.nodes.len() - 1
-        });
-        self.put(at, id, aabb);
-        self.bounds[at] = self.bounds[at].union(aabb);
-    }
-
-    /// Puts a box into the first free lane of a leaf. The bounds do not know it yet.
-    fn put(&mut self, leaf: usize, id: u32, aabb: &Aabb) {
-        let node = &mut self.nodes[leaf];
-        let lane = node.children.iter().position(|child| *child == NONE).unwrap_or(LANES - 1);
-        node.children[lane] = id;
-        node.set(lane, aabb);
-        self.room[leaf] -= 1;
-        self.places[id as usize] = (leaf * LANES + lane) as u32;
-    }
-
-    /// Returns the leaf with a free lane that grows least with a box: from the root on, the child that grows least. There is none if that
-    /// leads to full leaves, or if the leaf would become larger than the node above it.
-    fn leaf_with_room(&self, aabb: &Aabb) -> Option<usize> {
-        let (mut above, mut at) = (None, self.root()? as usize);
-        while !self.is_leaf(at as u32) {
-            let node = &self.nodes[at];
-            let has_room =
-                |lane: &usize| node.children[*lane] != NONE && self.room[node.children[*lane] as usize] > 0;
-            let growth = |lane: &usize| node.growth(*lane, aabb);
-            let lane =
-                (0..LANES).filter(has_room).min_by(|one, other| growth(one).total_cmp(&growth(other)))?;
-            (above, at) = (Some(at), node.children[lane] as usize);
-        }
-        let extent = extent_sum(&self.bounds[at].union(aabb));
-        let is_small = above.is_none_or(|above| extent <= policy::GROWN_TO * extent_sum(&self.bounds[above]));
-        (is_small && self.room[at] > 0).then_some(at)
-    }
-
-    fn push(&mut self, node: Node) {
+    pub(super) fn push(&mut self, node: Node) {
         self.room.push(node.children.iter().map(|child| u8::from(*child == NONE)).sum());
         self.nodes.push(node);
         self.parents.push(NONE);
@@ -404,7 +314,7 @@ impl BoxIndex {
 }
 
 /// Returns a place and an id in one word, in the order of places.
-fn word(place: u32, id: u32) -> u64 {
+pub(super) fn word(place: u32, id: u32) -> u64 {
     u64::from(place) << 32 | u64::from(id)
 }
 

@@ -41,7 +41,7 @@ fn distance(point: [f32; 3], other: &Aabb) -> f64 {
     if other.is_valid() { (0..3).map(|k| gap(k).powi(2)).sum::<f64>().sqrt() } else { f64::INFINITY }
 }
 
-/// Returns the boxes that a sweep meets, in the order of the visits.
+/// Returns the boxes that a cast meets, in the order of the visits.
 fn met(index: &BoxIndex, start: &Aabb, velocity: [f32; 3], max_time: f32) -> Vec<u32> {
     let mut found = Vec::new();
     index.cast_aabb(start, velocity, max_time, |id| {

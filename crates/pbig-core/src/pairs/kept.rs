@@ -14,7 +14,7 @@ const MIN_ROOM: u32 = 4;
 /// Marks a spare place of a row; the other bits are the row's id. Ids are below 2^28.
 const SPARE: u32 = 1 << 31;
 
-/// Number of ids that can be read in the time in which one event is applied to the rows of `b`. After a rebuild with more events
+/// Number of ids that can be read in the time in which one event is applied to the rows of `b`. After a search with more events
 /// than ids divided by this number, these rows are dropped, and made anew when they are needed.
 const IDS_OF_EVENT: usize = 32;
 
@@ -125,7 +125,7 @@ impl Rows {
 pub(crate) struct Kept {
     /// Rows of `b`, by `a`.
     pub(super) forward: Rows,
-    /// Rows of `a`, by `b`: made for the first sweep or question after a rebuild, then kept up to date.
+    /// Rows of `a`, by `b`: made for the first look-ups or question after a search, then kept up to date.
     backward: OnceLock<Rows>,
     /// By id: pairs in which it is `b`.
     lower: Vec<u32>,

@@ -57,8 +57,7 @@ impl fmt::Display for NoDevice {
 /// | `Auto` | hardware | a search of at least [`AUTO_DEVICE_FROM_BOXES`] | device |
 /// | `Auto` | any | any | CPU |
 ///
-/// In an update a device searches all boxes. The CPU looks at the changed ones alone if they are few, with a structure of the last
-/// update, which a device does not leave.
+/// In an update a device searches all boxes. The CPU looks at the changed ones alone if they are few.
 pub(crate) fn choose_backend(backend: Backend, is_software: Option<bool>, work: Work) -> Choice {
     Choice::Cpu(match (backend, is_software) {
         (Backend::Device, _) => return Choice::Device,

@@ -158,7 +158,7 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
     worlds.map(|(name, parts)| (name, Recipe(parts.to_vec()))).into()
 }
 
-/// Histories after which a grid that is edited again and again takes quadratic time.
+/// Histories after which a structure that is kept and changed again and again may take quadratic time.
 pub fn histories() -> Vec<(&'static str, History)> {
     let history =
         |start: &[Part], change: Change| History { start: Recipe(start.to_vec()), change, updates: 25 };
@@ -170,7 +170,7 @@ pub fn histories() -> Vec<(&'static str, History)> {
     let tiny_lattice = share(14, lattice([0.1, 0.2, 0.2], [1.4e-3; 3]));
     let crowd = [lattice([45.0, 45.0, 330.0], [0.3; 3]), tiny_lattice];
     let moved = history(&crowd, Change::Shift([800.0, 24_000.0, 0.07]));
-    // Found by search: what the last rebuild took says nothing when most of its pairs have ended.
+    // Found by search: what the last search took says nothing when most of its pairs have ended.
     let sheets = mixed(3.5, part([20.0, 180.0, 690.0], [3e3, 5e-5, 2e4]));
     let ended = history(&[line([1.4, 0.7, 0.5], [0.01; 3])], Change::To(Recipe(vec![long, sheets])));
     let changes = [
