@@ -169,6 +169,12 @@ impl World {
         all_absent
     }
 
+    /// Notes a change of a box.
+    #[cfg(feature = "serde")]
+    pub(super) fn note_change(&mut self, id: u32) {
+        self.change(|all| all.note_change(id));
+    }
+
     #[cold]
     pub(super) fn set_filter(&mut self, id: u32, filter: ProxyFilter) {
         self.change(|all| all.set_filter(id, filter));
