@@ -53,19 +53,18 @@ fn a_tree_alone_takes_no_work_without_bound() {
     }
 }
 
-/// A tree takes n^1.5, so that only a large number of needles is beyond the bound.
+/// A tree takes n^1.5: that of a large number of needles is given up. Their ends are staggered, so that streamed segment trees cut most.
 #[test]
 fn needles_that_a_tree_cannot_cut_apart_take_bounded_work() {
     let needle = |axis: usize| {
         let mut part = Part { width: [1.0; 3], half: [1e-9; 3], growth: 0.0, ..Part::CUBES };
-        (part.corner[axis], part.width[axis], part.half[axis]) = (0.5, 0.0, 0.5);
+        part.half[axis] = 0.5;
         part
     };
-    let boxes = Recipe([0, 1, 2].map(needle).to_vec()).boxes(700_000, 1);
+    let boxes = Recipe([0, 1, 2].map(needle).to_vec()).boxes(1_000_000, 1);
     let [tree, chosen] = [Some(Engine::Tree), None].map(|engine| search(&boxes, engine));
     println!("needles: {tree:.2} in a tree, {chosen:.2}");
-    println!("a search takes at most {WORK_LIMIT}");
-    assert!(chosen < WORK_LIMIT as f64 && tree > 64.0, "{chosen}, {tree} in a tree");
+    assert!(chosen < WORK_LIMIT as f64 && tree > 96.0, "{chosen}, {tree} in a tree");
 }
 
 /// They are in a class of their own, and as long as the world on one axis.

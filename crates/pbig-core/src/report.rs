@@ -97,7 +97,7 @@ pub struct Checks {
 
 /// Maximum [`Report::work`] for each box and pair, in binary logarithms of the number of boxes, for every shape, motion and history
 /// of the boxes. A pair counts if its boxes overlap, also if filters or keys exclude it. docs/ARCHITECTURE.md says why it holds.
-pub const WORK_LIMIT: u64 = 128;
+pub const WORK_LIMIT: u64 = 256;
 
 /// The report on the last call of a [`crate::Finder`] or [`crate::BroadPhase`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -117,7 +117,7 @@ pub struct Report {
     /// The work on the CPU, in tests of eight boxes at once: a row of cells counts as 32, a node of a tree as 8, an exact test as 4,
     /// about as long as they take. Sorting boxes is not counted, but ids without a box that a search reads are, and so is what was
     /// given up. At most [`crate::WORK_LIMIT`] for each box, change and pair, times the binary logarithm of the number of boxes,
-    /// unless [`crate::Backend::Brute`] or an engine was asked for.
+    /// unless [`crate::Backend::Brute`] or an engine was asked for. It does not depend on threads, unless the call found too many pairs.
     pub work: u64,
     /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).
     pub pairs: u64,

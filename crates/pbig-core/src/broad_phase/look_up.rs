@@ -29,12 +29,9 @@ impl LookUp {
     /// Brings the tree up to date, and leaves the events of an update in the task. Gives up if it takes too much work.
     pub(super) fn run(&mut self, task: &mut Task<'_>, tree: &mut Tree) -> Outcome {
         let (world, mut clock, mut outcome) = (task.world, Clock::start(), Outcome::default());
-        let refreshed = {
+        let (index, read) = {
             stage!("map");
             tree.refresh_sorted(world)
-        };
-        let Some((index, read)) = refreshed else {
-            return Outcome { work: world.changed.len() as u64, ..outcome };
         };
         index.in_order(&world.changed, &mut self.order);
         task.kept.make_backward();
@@ -43,10 +40,14 @@ impl LookUp {
         let is_forced = task.config.engine == Some(Engine::LookUp);
         let most = if is_forced { u64::MAX } else { policy::look_up_to_nodes(world.present.len()) };
         let budget = Budget::new(most);
-        self.look_up((world, task.kept, index), (&budget, task.config.limits.pairs()));
+        self.look_up((world, task.kept, index), &budget);
         self.gather(task.events, world.ids());
         let sum = |of: fn(&Thread) -> u64| self.threads.iter().map(of).sum::<u64>();
-        let (nodes, met) = (sum(|thread| thread.nodes), sum(|thread| thread.met));
+        let (mut nodes, mut met) = (sum(|thread| thread.nodes), sum(|thread| thread.met));
+        if budget.is_over() {
+            // Threads have stopped anywhere.
+            (nodes, met) = (most, 0);
+        }
         let made = nodes * BLOCK as u64;
         outcome.stages.check = clock.lap();
         outcome.checks = Checks { made, unnecessary: made - met, redundant: 0 };
@@ -57,12 +58,8 @@ impl LookUp {
         outcome
     }
 
-    /// Looks the changed boxes up. Some are left out if the budget does not suffice, or more pairs begin than there may be.
-    fn look_up(
-        &mut self,
-        (world, kept, index): (&World, &Kept, &BoxIndex),
-        (budget, most_added): (&Budget, u64),
-    ) {
+    /// Looks the changed boxes up. Some are left out if the budget does not suffice.
+    fn look_up(&mut self, (world, kept, index): (&World, &Kept, &BoxIndex), budget: &Budget) {
         let changed = self.order.len();
         let workers = if changed < policy::PARALLEL_FROM_CHANGES { 1 } else { available_threads() };
         self.threads.resize_with(workers.max(self.threads.len()), Thread::default);
@@ -72,7 +69,7 @@ impl LookUp {
         run_with(&mut self.threads[..workers], pieces, |thread, piece| {
             let ids = &order[piece_range(changed, piece, pieces)];
             if !budget.is_over() {
-                dispatch!(Thread::look_up, thread, (world, kept, index), ids, (budget, most_added));
+                dispatch!(Thread::look_up, thread, (world, kept, index), ids, budget);
             }
         });
     }
@@ -124,7 +121,7 @@ impl Thread {
         thread: &mut Self,
         (world, kept, index): (&World, &Kept, &BoxIndex),
         ids: &[u64],
-        (budget, most_added): (&Budget, u64),
+        budget: &Budget,
     ) {
         let mut told = thread.nodes + thread.met;
         for &word in ids {
@@ -137,7 +134,7 @@ impl Thread {
             if work > told + UNTOLD {
                 budget.charge(work - told);
                 told = work;
-                if budget.is_over() || thread.added.len() as u64 > most_added {
+                if budget.is_over() {
                     return;
                 }
             }

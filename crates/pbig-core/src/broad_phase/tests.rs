@@ -1,6 +1,6 @@
 //! Random worlds against the oracle, update by update: every engine gives the events that lead from one set to the next.
 
-use crate::{Aabb, Algorithm, BroadPhase, Config, Engine, Error, Limits, Pair, ProxyFilter, oracle};
+use crate::{Aabb, Algorithm, BroadPhase, Config, Engine, Error, Pair, ProxyFilter, oracle};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeSet;
@@ -144,22 +144,6 @@ fn every_engine_follows_random_worlds() {
         events += world.events;
     }
     assert!(events > 10_000, "{events} events");
-}
-
-#[test]
-fn look_ups_that_find_too_many_pairs_do_not_list_them_all() {
-    let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
-    let config = Config { limits, engine: Some(Engine::LookUp), ..Config::DEFAULT };
-    let mut broad_phase = BroadPhase::new(config).expect("a margin");
-    let cube = |id: u32| Aabb::from_center([10.0 * id as f32, 0.0, 0.0], [0.5; 3]);
-    (0..2000).for_each(|id| broad_phase.set(id, cube(id), ProxyFilter::ALL).expect("room"));
-    assert_eq!(broad_phase.update().expect("no pairs").added, []);
-    let all = Aabb::new([-1.0; 3], [20_001.0; 3]);
-    (0..50).for_each(|id| broad_phase.set(id, all, ProxyFilter::ALL).expect("room"));
-    assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 1000 }));
-    // 97,000 pairs.
-    let listed = broad_phase.events.added.capacity();
-    assert!(listed > 1000 && listed <= 2002 * crate::parallel::available_threads(), "{listed} pairs listed");
 }
 
 #[test]
@@ -342,4 +326,63 @@ fn many_boxes_set_on_threads_are_those_set_one_by_one() {
     let far = broad_phase.set_many(&ids, |id| place(id, 0));
     assert!(matches!(far, Err(crate::Error::TooManyBoxes { .. })), "{far:?}");
     assert!(broad_phase.len() > 18_000, "the others are set");
+}
+
+/// A burst of boxes that come, then one change an update: the boxes of the burst get places once.
+#[test]
+fn few_changes_after_a_burst_are_looked_up() {
+    let cube = |id: u32, by: f32| {
+        Aabb::from_center([id % 100, id / 100 % 100, id / 10_000].map(|x| x as f32), [0.4 + by; 3])
+    };
+    let mut broad_phase = BroadPhase::default();
+    let set = |of: &mut BroadPhase, id: u32, by: f32| of.set(id, cube(id, by), ProxyFilter::ALL).unwrap();
+    (0..20_000).for_each(|id| set(&mut broad_phase, id, 0.0));
+    broad_phase.update().unwrap();
+    set(&mut broad_phase, 0, 0.01);
+    broad_phase.update().unwrap();
+    for burst in 0..4 {
+        (0..800).for_each(|id| set(&mut broad_phase, 20_000 + 800 * burst + id, 0.0));
+        broad_phase.update().unwrap();
+        assert_eq!(broad_phase.report().plan.algorithm, Algorithm::Grid, "many places would be needed");
+        for update in 0..20 {
+            set(&mut broad_phase, update % 10, 0.02 + 0.001 * update as f32);
+            broad_phase.update().unwrap();
+            assert_eq!(
+                broad_phase.report().plan.algorithm,
+                Algorithm::LookUp,
+                "burst {burst}, update {update}"
+            );
+            assert!(update == 0 || broad_phase.report().work < 2000, "{}", broad_phase.report().work);
+        }
+    }
+}
+
+/// The work of what was given up does not depend on where threads stop.
+#[test]
+fn reports_of_given_up_ways_do_not_depend_on_threads() {
+    let needles = crate::bvh::tests::needles(30_000);
+    let grown = |id: u32, by: f32| {
+        Aabb::from_center([id % 40, id / 40 % 40, id / 1600].map(|x| x as f32 * 1.5), [0.1 + by; 3])
+    };
+    let told = |threads: usize| {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
+            let mut finder = crate::Finder::default();
+            finder.find(&needles).unwrap();
+            let mut told = vec![(finder.report().work, finder.report().plan.algorithm)];
+            let (count, mut broad_phase) = (std::sync::atomic::AtomicU64::new(0), BroadPhase::default());
+            let visit = |_| _ = count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            assert_eq!(finder.for_each_pair(&needles, visit), Ok(count.into_inner()));
+            told.push((finder.report().work, finder.report().plan.algorithm));
+            for (from, to, by) in
+                [(0, 30_000, 0.0), (0, 1, 0.01), (0, 3000, 8.0), (0, 3000, 0.001), (5, 6, 0.2)]
+            {
+                (from..to).for_each(|id| broad_phase.set(id, grown(id, by), ProxyFilter::ALL).unwrap());
+                broad_phase.update().unwrap();
+                told.push((broad_phase.report().work, broad_phase.report().plan.algorithm));
+            }
+            told
+        })
+    };
+    let one = told(1);
+    assert!((0..4).all(|_| told(2) == one && told(4) == one), "{one:?}");
 }

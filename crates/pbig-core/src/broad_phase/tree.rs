@@ -4,7 +4,6 @@
 use super::world::World;
 use crate::BoxIndex;
 use crate::parallel::alone;
-use crate::policy;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
@@ -111,23 +110,21 @@ impl Tree {
         Fresh::new(index, changed)
     }
 
-    /// Makes the tree fresh, with its boxes sorted, for look-ups of the changed ones. Returns it, and how many boxes were read; none, and
-    /// leaves the tree as it is, if too many boxes came or have jumped.
-    pub(super) fn refresh_sorted(&mut self, world: &World) -> Option<(&BoxIndex, usize)> {
+    /// Returns how many of the changed boxes need new places in the tree.
+    pub(super) fn arrivals(&mut self, world: &World) -> usize {
         self.make_stale();
-        let stale = self.stale_mut();
-        let before = stale.changed.len();
-        stale.changed.extend_from_slice(&world.changed);
-        let known = stale.knows_changes.then_some(&stale.changed[..]);
-        let arrivals = known.map_or(0, |changed| stale.index.arrivals(&world.boxes, changed));
-        if !policy::may_place(world.present.len(), arrivals) {
-            stale.changed.truncate(before);
-            return None;
-        }
-        let read = stale.index.refresh_sorted(&world.boxes, known, world.present.iter());
-        let Stale { index, changed, .. } = std::mem::take(stale);
+        self.stale_mut().index.arrivals(&world.boxes, &world.changed)
+    }
+
+    /// Makes the tree fresh, with its boxes sorted, for look-ups of the changed ones. Returns it, and how many boxes were read.
+    pub(super) fn refresh_sorted(&mut self, world: &World) -> (&BoxIndex, usize) {
+        self.make_stale();
+        let Stale { mut index, mut changed, knows_changes } = std::mem::take(self.stale_mut());
+        changed.extend_from_slice(&world.changed);
+        let known = knows_changes.then_some(&changed[..]);
+        let read = index.refresh_sorted(&world.boxes, known, world.present.iter());
         let fresh = Fresh::new(index, changed);
-        Some((&self.fresh.get_or_init(|| fresh).index, read))
+        (&self.fresh.get_or_init(|| fresh).index, read)
     }
 
     /// Notes how many nodes the look-ups have looked at, and whether they were given up.

@@ -83,10 +83,14 @@ impl BroadPhase {
     /// Returns true if the changed boxes should be looked up.
     fn may_look_up(&mut self, changed: usize) -> bool {
         match self.config.engine {
-            _ if self.config.backend == Backend::Brute => false,
-            Some(engine) => engine == Engine::LookUp,
-            None => policy::may_look_up(self.world.present.len(), changed) && !self.given_up.forbids(changed),
+            _ if self.config.backend == Backend::Brute => return false,
+            Some(engine) => return engine == Engine::LookUp,
+            None => {}
         }
+        let boxes = self.world.present.len();
+        policy::may_look_up(boxes, changed)
+            && !self.given_up.forbids(changed)
+            && policy::may_place(boxes, self.world.arrivals())
     }
 
     /// Runs one of the ways to make an update.

@@ -21,6 +21,9 @@ const MAX_SEARCHES: u32 = 64;
 /// Maximum share of boxes that came or have jumped, as one in this number: a place takes as long as two look-ups.
 const PLACE_ONE_IN: usize = 32;
 
+/// A number of boxes that came or have jumped that finds places in any world.
+const FEW_ARRIVALS: usize = 8;
+
 /// Smaller worlds may take as much work as one of this size.
 const SMALL_WORLD: usize = 4096;
 
@@ -36,7 +39,7 @@ pub(crate) fn may_look_up(boxes: usize, changed: usize) -> bool {
 
 /// Returns true if so many boxes that came or have jumped get places in the tree.
 pub(crate) fn may_place(boxes: usize, arrivals: usize) -> bool {
-    arrivals * PLACE_ONE_IN <= boxes.max(SMALL_WORLD)
+    arrivals <= FEW_ARRIVALS.max(boxes / PLACE_ONE_IN)
 }
 
 /// A way that was given up because it took too much work. The next updates with as many changes go another way at once: one

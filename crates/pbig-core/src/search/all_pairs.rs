@@ -93,8 +93,9 @@ pub(crate) struct Store {
     pub(crate) tree: BoxIndex,
     /// Both sets in one list, for a tree.
     both_sets: Scratch<Vec<Aabb>>,
-    /// Grids that took too much work.
-    given_up: policy::GivenUp,
+    /// Grids, and trees, that took too much work.
+    grids: policy::GivenUp,
+    trees: policy::GivenUp,
 }
 
 impl Store {
@@ -171,15 +172,24 @@ impl AllPairs {
     }
 
     fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, outcome: &mut Outcome) {
-        let is_hard = request.is_repeated && store.given_up.forbids(0);
-        if request.config.engine != Some(Engine::Tree) && !is_hard {
+        let is_forced = request.config.engine == Some(Engine::Tree);
+        let is_hard = request.is_repeated && store.grids.forbids(0);
+        if !is_forced && !is_hard {
             let is_done = self.search_grid(request, store, rule, outcome);
-            store.given_up.note(!is_done, 0);
+            store.grids.note(!is_done, 0);
             if is_done {
                 return;
             }
         }
-        self.search_tree(request, (&mut store.tree, &mut store.both_sets), rule, outcome);
+        let is_hard = request.is_repeated && store.trees.forbids(0);
+        if is_forced || !is_hard {
+            let is_done = self.search_tree(request, store, rule, outcome);
+            store.trees.note(!is_done, 0);
+            if is_done {
+                return;
+            }
+        }
+        self.stream(request, store, rule, outcome);
     }
 
     /// Finds the pairs in a grid. Returns false if that takes too much work.
@@ -217,15 +227,14 @@ impl AllPairs {
         is_done
     }
 
-    /// Finds the pairs in a tree of all boxes, or where that takes too much work, by streamed segment trees: a tree does not cut boxes
-    /// apart that cross.
+    /// Finds the pairs in a tree of all boxes. Returns false if that takes too much work.
     fn search_tree(
         &mut self,
         request: &Request<'_>,
-        (tree, both_sets): (&mut BoxIndex, &mut Vec<Aabb>),
+        Store { tree, both_sets, .. }: &mut Store,
         rule: &Rule<'_>,
         outcome: &mut Outcome,
-    ) {
+    ) -> bool {
         let mut clock = Clock::start();
         let (boxes, split) = request.in_one_list(both_sets);
         {
@@ -235,14 +244,22 @@ impl AllPairs {
         outcome.stages.map += clock.lap();
         stage!("check");
         outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: tree.len() as u32, ..Plan::default() };
-        let is_sure = request.config.engine == Some(Engine::Tree);
         let most = search::join_up_to_work(tree.len());
-        let is_done = self.run_within((!is_sure).then_some(most), request, rule, outcome, |rule, hits| {
+        let most = (request.config.engine != Some(Engine::Tree)).then_some(most);
+        let is_done = self.run_within(most, request, rule, outcome, |rule, hits| {
             join::find_pairs(tree, split, rule, hits);
         });
-        if !is_done {
-            streamed::find_pairs(boxes, split, rule, &mut self.hits);
-        }
+        outcome.stages.check += clock.lap();
+        is_done
+    }
+
+    /// Finds the pairs by streamed segment trees: a tree does not cut boxes apart that cross.
+    fn stream(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, outcome: &mut Outcome) {
+        stage!("check");
+        let mut clock = Clock::start();
+        let (boxes, split) = request.in_one_list(&mut store.both_sets);
+        let valid = streamed::find_pairs(boxes, split, rule, &mut self.hits);
+        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: valid as u32, ..Plan::default() };
         outcome.stages.check += clock.lap();
     }
 
@@ -264,7 +281,8 @@ impl AllPairs {
             if !budget.is_over() && receiver.is_none() {
                 return true;
             }
-            outcome.work += self.hits.iter().map(Hits::work).sum::<u64>();
+            // Where threads stop is a matter of time.
+            outcome.work += if budget.is_over() { most } else { self.hits.iter().map(Hits::work).sum() };
             self.begin(request);
             rule.found.store(0, Ordering::Relaxed);
             if budget.is_over() {

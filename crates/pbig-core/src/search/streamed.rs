@@ -58,8 +58,8 @@ fn ordered(x: f32) -> u32 {
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
-/// Finds all pairs of some boxes; with a `split`, the pairs of an id below it and an id from it on.
-pub(crate) fn find_pairs(boxes: &[Aabb], split: Option<u32>, rule: &Rule<'_>, hits: &mut [Hits]) {
+/// Finds all pairs of some boxes; with a `split`, the pairs of an id below it and an id from it on. Returns how many boxes are valid.
+pub(crate) fn find_pairs(boxes: &[Aabb], split: Option<u32>, rule: &Rule<'_>, hits: &mut [Hits]) -> usize {
     let valid = (0..).zip(boxes).filter(|(_, aabb)| aabb.is_valid());
     let all: Vec<Corners> = valid.map(|(id, aabb)| Corners::new(id, aabb)).collect();
     match split.map(|split| all.partition_point(|one| one.id < split)) {
@@ -70,6 +70,7 @@ pub(crate) fn find_pairs(boxes: &[Aabb], split: Option<u32>, rule: &Rule<'_>, hi
             stream(second, first, rule, hits);
         }
     }
+    all.len()
 }
 
 /// Finds the pairs of an interval and a point on the last axis that overlap on the other ones.
