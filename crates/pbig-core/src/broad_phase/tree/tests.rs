@@ -1,4 +1,6 @@
-use crate::{Aabb, BroadPhase, ProxyFilter};
+use crate::{Aabb, Algorithm, BroadPhase, ProxyFilter};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
 use std::sync::{Barrier, mpsc};
 use std::time::Duration;
 
@@ -23,7 +25,7 @@ fn met(broad_phase: &BroadPhase, aabb: &Aabb) -> Vec<u32> {
     met
 }
 
-/// Whoever refits must not wait for a thread of the pool, because all of them may wait for the refit.
+/// A thread that refits the tree must not wait for one of the pool, because all of these may wait for the refit.
 #[test]
 fn a_thread_refits_the_tree_although_all_of_the_pool_wait_for_it() {
     let (sender, receiver) = mpsc::channel();
@@ -80,4 +82,46 @@ fn the_tree_knows_all_changes() {
             assert!(met(&broad_phase, &fat).contains(&id), "update {time}, box {id}");
         }
     }
+}
+
+/// Boxes of several sizes and shapes, in parts of the tree of several heights. Some jump, some go, some come back elsewhere, and after
+/// a while all move. Answers are those of a scan, and pairs those of a search from nothing.
+#[test]
+fn jumps_and_returns_among_many_sizes_are_known_exactly() {
+    let n = 18_000u32;
+    let mut random = StdRng::seed_from_u64(8);
+    let mut any = |id: u32| {
+        let at = [0; 3].map(|_| random.random_range(0.0f32..60.0));
+        let size = [0.3, 0.5, 6.0, 0.5, 0.02][id as usize % 5];
+        let flat = if id.is_multiple_of(7) { 0.01 } else { 1.0 };
+        Aabb::from_center(at, [size, size * flat, size])
+    };
+    let (mut broad_phase, mut finder) = (BroadPhase::default(), crate::Finder::default());
+    (0..n).for_each(|id| broad_phase.set(id, any(id), ProxyFilter::ALL).expect("a small id"));
+    let mut looked_up = 0;
+    for update in 0..30u32 {
+        let (changed, by) = ([3, 200, 900, n][update as usize % 4], update * 577);
+        for id in (0..changed).map(|i| (i * 13 + by) % n) {
+            match (id + update) % 4 {
+                0 => _ = broad_phase.remove(id),
+                1 => broad_phase.set(id, any(id), ProxyFilter::ALL).expect("a small id"),
+                _ if broad_phase.contains(id) => {
+                    let aabb = broad_phase.fat_aabb(id).map_or(Aabb::NOWHERE, |aabb| aabb.inflated(0.01));
+                    broad_phase.set(id, aabb, ProxyFilter::ALL).expect("a small id");
+                }
+                _ => {}
+            }
+        }
+        broad_phase.update().expect("few pairs");
+        looked_up += u32::from(broad_phase.report().plan.algorithm == Algorithm::LookUp);
+        let found = finder.find(broad_phase.fat_aabbs()).expect("few pairs");
+        assert!(broad_phase.pairs().eq(found.iter().copied()), "update {update}");
+        for _ in 0..5 {
+            let asked = any(3);
+            let scanned =
+                (0..n).filter(|id| broad_phase.fat_aabb(*id).is_some_and(|aabb| aabb.overlaps(&asked)));
+            assert!(met(&broad_phase, &asked).into_iter().eq(scanned), "update {update}");
+        }
+    }
+    assert!(looked_up >= 10, "{looked_up} updates looked changed boxes up");
 }
