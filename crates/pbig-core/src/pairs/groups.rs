@@ -68,20 +68,26 @@ pub(crate) struct Groups {
 }
 
 impl Groups {
-    /// Gathers the pairs that threads have found and counted by this grouping, and returns their number.
-    pub(crate) fn gather(&mut self, grouping: Grouping, mut lists: Vec<&mut Found>, workers: usize) -> usize {
+    /// Gathers the pairs that threads have found and counted by this grouping, and returns their number. `of` returns those of a thread.
+    pub(crate) fn gather<T: Send>(
+        &mut self,
+        grouping: Grouping,
+        (threads, of): (&mut [T], fn(&mut T) -> &mut Found),
+        workers: usize,
+    ) -> usize {
         self.grouping = grouping;
-        let count = self.place(&mut lists);
-        if let ([list], 1) = (&mut lists[..], grouping.count) {
-            std::mem::swap(&mut self.pairs, &mut list.pairs);
+        let count = self.place((threads, of));
+        if let ([one], 1) = (&mut *threads, grouping.count) {
+            std::mem::swap(&mut self.pairs, &mut of(one).pairs);
             return count;
         }
         ensure_scratch(&mut self.pairs, count, Pair::default());
         let pairs = SharedSlice::new(&mut self.pairs);
-        let (len, lists) = (lists.len(), SharedSlice::new(&mut lists));
-        run(workers, len, |_, list| {
+        let (len, threads) = (threads.len(), SharedSlice::new(threads));
+        run(workers, len, |_, thread| {
             // SAFETY: each piece has its own list.
-            let Found { pairs: found, groups: next, .. } = unsafe { &mut *lists.part(list..list + 1)[0] };
+            let Found { pairs: found, groups: next, .. } =
+                of(unsafe { &mut threads.part(thread..thread + 1)[0] });
             for pair in found.iter() {
                 let place = &mut next[(pair.a >> grouping.shift) as usize];
                 // SAFETY: every pair of every list has its own place.
@@ -107,13 +113,13 @@ impl Groups {
     }
 
     /// Turns the counts of all lists into places.
-    fn place(&mut self, lists: &mut [&mut Found]) -> usize {
+    fn place<T>(&mut self, (threads, of): (&mut [T], fn(&mut T) -> &mut Found)) -> usize {
         self.starts.clear();
         let mut next = 0;
         for group in 0..self.grouping.count {
             self.starts.push(next);
-            for list in lists.iter_mut() {
-                next += std::mem::replace(&mut list.groups[group], next);
+            for thread in threads.iter_mut() {
+                next += std::mem::replace(&mut of(thread).groups[group], next);
             }
         }
         self.starts.push(next);

@@ -296,7 +296,7 @@ impl AllPairs {
     /// Gathers what was found, for sorting.
     pub(crate) fn gather(&mut self, grouping: Grouping, groups: &mut Groups) -> usize {
         let workers = self.hits.len();
-        groups.gather(grouping, self.hits.iter_mut().map(|hits| &mut hits.found).collect(), workers)
+        groups.gather(grouping, (&mut self.hits, |hits| &mut hits.found), workers)
     }
 
     /// Forgets the pairs, and gives memory back if as many are expected.
