@@ -218,11 +218,11 @@ fn an_index_takes_77_bytes_and_an_id_of_the_core_65() {
     let (mut colliders, far) = (ColliderSet::new(), 1 << 20);
     let all: Vec<_> = (0..=far).map(|_| colliders.insert(ColliderBuilder::ball(0.5))).collect();
     // Brute force keeps less for an id.
-    let left: Vec<_> = all[..250].iter().chain(all.last()).copied().collect();
-    for &gone in &all[250..far as usize] {
+    let left: Vec<_> = all[..450].iter().chain(all.last()).copied().collect();
+    for &gone in &all[450..far as usize] {
         colliders.remove(gone, &mut IslandManager::new(), &mut RigidBodySet::new(), false);
     }
-    for (i, &apart) in all[1..250].iter().enumerate() {
+    for (i, &apart) in all[1..450].iter().enumerate() {
         colliders[apart].set_translation(vector![0.0, 5.0 + i as f32, 0.0]);
     }
     colliders[all[0]].set_active_collision_types(ActiveCollisionTypes::all());
@@ -234,7 +234,7 @@ fn an_index_takes_77_bytes_and_an_id_of_the_core_65() {
     });
     let mut core = pbig_core::BroadPhase::default();
     let of_core = bytes_of_an_index(far, |x| {
-        for (id, x) in (1..250).map(|id| (id, 9.0 + 2.0 * id as f32)).chain([(0, x), (far, 0.0)]) {
+        for (id, x) in (1..450).map(|id| (id, 9.0 + 2.0 * id as f32)).chain([(0, x), (far, 0.0)]) {
             let aabb = pbig_core::Aabb::from_center([x, 0.0, 0.0], [0.5; 3]);
             core.set(id, aabb, pbig_core::ProxyFilter::ALL).expect("a dense id");
         }

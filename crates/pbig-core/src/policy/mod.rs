@@ -19,7 +19,7 @@ pub(crate) use engine::{
 pub(crate) const PARALLEL_FROM_BOXES: usize = 16_384;
 
 /// Maximum number of boxes for a test of every pair, eight at a time: a grid takes longer.
-pub(crate) const BRUTE_FORCE_UP_TO_BOXES: usize = 300;
+pub(crate) const BRUTE_FORCE_UP_TO_BOXES: usize = 400;
 
 /// Wanted number of boxes in a cell, where density and not size decides about cells.
 pub(crate) const BOXES_PER_CELL: f64 = 0.5;
