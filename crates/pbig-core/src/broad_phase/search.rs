@@ -46,7 +46,7 @@ impl Search {
         if outcome.end != End::Done {
             return outcome;
         }
-        if outcome.plan.algorithm == Algorithm::Tree && !is_listed {
+        if self.store.has_tree && !is_on_device && !is_listed {
             tree.adopt(&mut self.store.tree);
         }
         let mut clock = Clock::start();
@@ -55,6 +55,12 @@ impl Search {
         outcome.has_replaced_kept = self.compare(task, is_brute, is_listed);
         outcome.stages.diff = clock.lap();
         outcome
+    }
+
+    /// The next searches begin with streamed segment trees, as after grids and trees that took too much work.
+    #[cfg(test)]
+    pub(super) fn give_up_grids_and_trees(&mut self) {
+        (0..4).for_each(|_| self.store.note_given_up());
     }
 
     /// Gives memory back if as many pairs are expected.

@@ -386,3 +386,32 @@ fn reports_of_given_up_ways_do_not_depend_on_threads() {
     let one = told(1);
     assert!((0..4).all(|_| told(2) == one && told(4) == one), "{one:?}");
 }
+
+/// Streamed segment trees leave no tree: queries and look-ups after them must not read that of an earlier search.
+#[test]
+fn a_search_by_streams_leaves_no_old_tree() {
+    let mut random = StdRng::seed_from_u64(4);
+    let mut broad_phase = BroadPhase::new(Config { engine: None, ..Config::DEFAULT }).unwrap();
+    let mut any = || Aabb::from_center([0; 3].map(|_| random.random_range(0.0f32..30.0)), [0.5; 3]);
+    for round in 0..12 {
+        let few = round % 3 == 2;
+        for id in (0..5000).filter(|id| !few || id % 100 == 0) {
+            broad_phase.set(id, any(), ProxyFilter::ALL).unwrap();
+        }
+        match round % 6 {
+            0 => broad_phase.config.engine = Some(Engine::Tree),
+            1 | 3 | 4 => {
+                broad_phase.config.engine = None;
+                broad_phase.search.give_up_grids_and_trees();
+            }
+            _ => broad_phase.config.engine = Some(Engine::LookUp),
+        }
+        broad_phase.update().unwrap();
+        assert!(broad_phase.pairs().eq(oracle::pairs(broad_phase.fat_aabbs())), "round {round}");
+        let asked = any().inflated(2.0);
+        let mut met = broad_phase.overlapping(&asked);
+        met.sort_unstable();
+        let wanted = (0..5000).filter(|id| broad_phase.fat_aabbs()[*id as usize].overlaps(&asked));
+        assert!(met.into_iter().eq(wanted), "round {round}");
+    }
+}

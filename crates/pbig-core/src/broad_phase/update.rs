@@ -67,7 +67,7 @@ impl BroadPhase {
                 return Ok(());
             }
         }
-        if self.may_look_up(changed) {
+        if self.chooses_look_ups(changed) {
             let outcome = self.run(|parts, task, tree| parts.look_up.run(task, tree));
             self.given_up.note(outcome.end == End::GivenUp, changed);
             if self.take(outcome)? {
@@ -80,8 +80,8 @@ impl BroadPhase {
         Ok(())
     }
 
-    /// Returns true if the changed boxes should be looked up.
-    fn may_look_up(&mut self, changed: usize) -> bool {
+    /// Chooses whether the changed boxes are looked up. A search that is made because look-ups were given up counts as one of those to come.
+    fn chooses_look_ups(&mut self, changed: usize) -> bool {
         match self.config.engine {
             _ if self.config.backend == Backend::Brute => return false,
             Some(engine) => return engine == Engine::LookUp,

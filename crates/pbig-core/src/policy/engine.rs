@@ -46,23 +46,23 @@ pub(crate) fn may_place(boxes: usize, arrivals: usize) -> bool {
 /// after the first, twice as many after each further one, and half as many after each that was not given up.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct GivenUp {
-    /// Number of changed boxes of the last update that was given up.
+    /// Number of changed boxes of the last update in which it was given up; 0 for a search of all boxes.
     changed: usize,
-    /// Searches after it.
+    /// Calls without it after that.
     searches: u32,
-    /// Searches that are still to come.
+    /// Calls without it that are still to come.
     left: u32,
 }
 
 impl GivenUp {
-    /// Returns true if look-ups of so many boxes would be given up again. Counts the search that is made instead.
+    /// Returns true if the way would be given up again. Counts the call that goes another way instead.
     pub(crate) fn forbids(&mut self, changed: usize) -> bool {
         let is_like_it = self.left > 0 && changed >= self.changed;
         self.left -= u32::from(is_like_it);
         is_like_it
     }
 
-    /// Notes whether look-ups were given up.
+    /// Notes whether the way was given up.
     pub(crate) fn note(&mut self, is_given_up: bool, changed: usize) {
         if is_given_up {
             let searches = (2 * self.searches).clamp(1, MAX_SEARCHES);
@@ -73,7 +73,7 @@ impl GivenUp {
     }
 }
 
-/// Returns the maximum number of nodes for look-ups: 5 ns each, while a search sorts and joins a box in about 150 ns.
+/// Returns the maximum number of nodes for look-ups, 5 ns each: about as long as a search of sparse boxes takes.
 pub(crate) fn look_up_to_nodes(boxes: usize) -> u64 {
     LOOK_UP_TO_NODES_PER_BOX * boxes.max(SMALL_WORLD) as u64
 }

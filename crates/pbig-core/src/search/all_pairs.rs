@@ -91,6 +91,8 @@ pub(crate) struct Store {
     grid: Scratch<Grid>,
     two_grids: Scratch<TwoGrids>,
     pub(crate) tree: BoxIndex,
+    /// The tree has the boxes of the last search.
+    pub(crate) has_tree: bool,
     /// Both sets in one list, for a tree.
     both_sets: Scratch<Vec<Aabb>>,
     /// Grids, and trees, that took too much work.
@@ -99,6 +101,13 @@ pub(crate) struct Store {
 }
 
 impl Store {
+    /// Notes that a grid and a tree were given up.
+    #[cfg(test)]
+    pub(crate) fn note_given_up(&mut self) {
+        self.grids.note(true, 0);
+        self.trees.note(true, 0);
+    }
+
     /// Gives back memory that the boxes of the last search did not need.
     pub(crate) fn settle(&mut self) {
         self.grid.settle();
@@ -123,6 +132,7 @@ impl AllPairs {
     pub(crate) fn find(&mut self, request: &Request<'_>, store: &mut Store) -> Outcome {
         let mut outcome = Outcome::default();
         self.begin(request);
+        store.has_tree = false;
         let found = AtomicU64::new(0);
         let rule = request.rule(&found);
         if request.is_for_brute_force() {
@@ -231,7 +241,7 @@ impl AllPairs {
     fn search_tree(
         &mut self,
         request: &Request<'_>,
-        Store { tree, both_sets, .. }: &mut Store,
+        Store { tree, has_tree, both_sets, .. }: &mut Store,
         rule: &Rule<'_>,
         outcome: &mut Outcome,
     ) -> bool {
@@ -241,6 +251,7 @@ impl AllPairs {
             stage!("map");
             tree.sort_sets(boxes, split);
         }
+        *has_tree = true;
         outcome.stages.map += clock.lap();
         stage!("check");
         outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: tree.len() as u32, ..Plan::default() };
