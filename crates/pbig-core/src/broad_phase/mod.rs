@@ -71,6 +71,8 @@ pub struct BroadPhase {
     device: DeviceSlot,
     world: World,
     given_up: policy::GivenUp,
+    /// Many boxes that came or jumped got places in the tree.
+    jumped: policy::GivenUp,
     /// The algorithm of the last update with changes.
     last: Algorithm,
     look_up: Scratch<LookUp>,
@@ -181,13 +183,16 @@ impl BroadPhase {
                 result = Err(error);
             }
         };
-        if ids.len() >= PARALLEL_FROM_BOXES && ids.is_sorted_by(|one, next| one < next) {
-            let absent = self.world.set_many(ids, of, self.config.margin);
-            absent.into_iter().for_each(|(id, aabb, filter)| set(self, id, aabb, filter));
-            return result;
+        let mut rest = ids;
+        if ids.len() >= PARALLEL_FROM_BOXES {
+            let (known, new) = ids.split_at(ids.partition_point(|id| (*id as usize) < self.world.ids()));
+            if let Some(absent) = self.world.set_many(known, &of, self.config.margin) {
+                absent.into_iter().for_each(|(id, aabb, filter)| set(self, id, aabb, filter));
+                rest = new;
+            }
         }
-        for (i, &id) in ids.iter().enumerate() {
-            if let Some(&ahead) = ids.get(i + AHEAD) {
+        for (i, &id) in rest.iter().enumerate() {
+            if let Some(&ahead) = rest.get(i + AHEAD) {
                 self.prefetch(ahead);
             }
             if let Some((aabb, filter)) = of(id) {

@@ -343,7 +343,6 @@ fn few_changes_after_a_burst_are_looked_up() {
     for burst in 0..4 {
         (0..800).for_each(|id| set(&mut broad_phase, 20_000 + 800 * burst + id, 0.0));
         broad_phase.update().unwrap();
-        assert_eq!(broad_phase.report().plan.algorithm, Algorithm::Grid, "many places would be needed");
         for update in 0..20 {
             set(&mut broad_phase, update % 10, 0.02 + 0.001 * update as f32);
             broad_phase.update().unwrap();
@@ -355,6 +354,52 @@ fn few_changes_after_a_burst_are_looked_up() {
             assert!(update == 0 || broad_phase.report().work < 2000, "{}", broad_phase.report().work);
         }
     }
+    // A group that jumps and then stays in motion, and after it all that do.
+    for (group, far) in [(800, 300.0), (20_000, 1000.0)] {
+        let place = |id: u32, by: f32| {
+            let Aabb { min, max } = cube(id, 0.0);
+            Aabb::new(min.map(|x| x + far + by), max.map(|x| x + far + by))
+        };
+        let mut looked_up = 0;
+        for update in 0..20 {
+            let moved = if update == 0 { group } else { 800 };
+            let by = update as f32 * 0.1;
+            (0..moved).for_each(|id| broad_phase.set(id, place(id, by), ProxyFilter::ALL).unwrap());
+            broad_phase.update().unwrap();
+            looked_up += u32::from(broad_phase.report().plan.algorithm == Algorithm::LookUp);
+        }
+        assert!(looked_up >= 8, "{group} jump: {looked_up} of 20 updates looked up");
+    }
+}
+
+/// Boxes that change again before an update are not listed twice, but the tree learns of it.
+#[test]
+fn the_tree_knows_boxes_that_threads_set_twice() {
+    let n = 20_000;
+    let cube = |id: u32, by: f32| {
+        Aabb::from_center([id % 30, id / 30 % 30, id / 900].map(|x| x as f32 * 1.5 + by), [0.5; 3])
+    };
+    let ids: Vec<u32> = (0..n).collect();
+    let mut broad_phase = BroadPhase::default();
+    broad_phase.set_many(&ids, |id| Some((cube(id, 0.0), ProxyFilter::ALL))).unwrap();
+    assert!(broad_phase.overlapping(&cube(7, 0.0)).contains(&7));
+    broad_phase.set_many(&ids, |id| Some((cube(id, 100.0), ProxyFilter::ALL))).unwrap();
+    assert!(
+        broad_phase.overlapping(&cube(7, 0.0)).is_empty()
+            && broad_phase.overlapping(&cube(7, 100.0)).contains(&7)
+    );
+    broad_phase.update().unwrap();
+    broad_phase.set(7, cube(8, 100.1), ProxyFilter::ALL).unwrap();
+    broad_phase.update().unwrap();
+    assert_eq!(broad_phase.report().plan.algorithm, Algorithm::LookUp);
+    assert!(broad_phase.pairs().eq(oracle_of(&broad_phase)));
+    let last = [&ids[..], &[u32::MAX]].concat();
+    let far = broad_phase.set_many(&last, |id| Some((cube(id % n, 0.0), ProxyFilter::ALL)));
+    assert!(matches!(far, Err(Error::TooManyBoxes { .. })), "{far:?}");
+}
+
+fn oracle_of(broad_phase: &BroadPhase) -> Vec<Pair> {
+    crate::find_pairs(broad_phase.fat_aabbs()).expect("few pairs")
 }
 
 /// The work of what was given up does not depend on where threads stop.

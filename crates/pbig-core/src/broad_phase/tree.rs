@@ -110,10 +110,14 @@ impl Tree {
         Fresh::new(index, changed)
     }
 
-    /// Returns how many of the changed boxes need new places in the tree.
+    /// Returns how many of the changed boxes need new places in the tree. If it does not know what has changed, all are read anyway.
     pub(super) fn arrivals(&mut self, world: &World) -> usize {
-        self.make_stale();
-        self.stale_mut().index.arrivals(&world.boxes, &world.changed)
+        let Stale { index, knows_changes, .. } = self.stale.get_mut().unwrap_or_else(PoisonError::into_inner);
+        match self.fresh.get_mut() {
+            Some(_) => 0,
+            None if *knows_changes => index.arrivals(&world.boxes, &world.changed),
+            None => 0,
+        }
     }
 
     /// Makes the tree fresh, with its boxes sorted, for look-ups of the changed ones. Returns it, and how many boxes were read.

@@ -88,9 +88,15 @@ impl BroadPhase {
             None => {}
         }
         let boxes = self.world.present.len();
-        policy::may_look_up(boxes, changed)
-            && !self.given_up.forbids(changed)
-            && policy::may_place(boxes, self.world.arrivals())
+        if !policy::may_look_up(boxes, changed) || self.given_up.forbids(changed) {
+            return false;
+        }
+        let are_few = policy::may_place(boxes, self.world.arrivals());
+        if !are_few && self.jumped.forbids(0) {
+            return false;
+        }
+        self.jumped.note(!are_few, 0);
+        true
     }
 
     /// Runs one of the ways to make an update.

@@ -108,16 +108,19 @@ impl World {
         self.change(|all| all.set_aabb(id, aabb, margin))
     }
 
-    /// Moves many boxes on threads; their ids ascend. `of` returns box and filter of an id, or none to leave its box alone. Returns
-    /// those that are not present. After a panic in `of` some boxes have moved.
+    /// Moves many boxes on threads. `of` returns box and filter of an id, or none to leave its box alone. Returns those that are not
+    /// present; none, and moves no box, unless the ids ascend and are known. After a panic in `of` some boxes have moved.
     pub(super) fn set_many(
         &mut self,
         ids: &[u32],
-        of: impl Fn(u32) -> Option<(Aabb, ProxyFilter)> + Sync,
+        of: &(impl Fn(u32) -> Option<(Aabb, ProxyFilter)> + Sync),
         margin: f32,
-    ) -> Vec<(u32, Aabb, ProxyFilter)> {
-        let (known, is_filtered) = (self.ids(), self.is_filtered);
-        let pieces = ids.len().div_ceil(PIECE);
+    ) -> Option<Vec<(u32, Aabb, ProxyFilter)>> {
+        let are_known = ids.last().is_none_or(|last| (*last as usize) < self.ids());
+        if !are_known || !ids.is_sorted_by(|one, next| one < next) {
+            return None;
+        }
+        let (is_filtered, pieces) = (self.is_filtered, ids.len().div_ceil(PIECE));
         let mut moved: Vec<Moved> = (0..pieces).map(|_| Moved { is_filtered, ..Moved::default() }).collect();
         let shared = SharedSlice::new(&mut moved);
         let (boxes, filters) = (SharedSlice::new(&mut self.boxes), SharedSlice::new(&mut self.filters));
@@ -125,19 +128,15 @@ impl World {
         let done = catch_unwind(AssertUnwindSafe(|| {
             run(threads_for(pieces), pieces, |_, piece| {
                 let ids = &ids[piece * PIECE..ids.len().min((piece + 1) * PIECE)];
-                let range = known.min(ids[0] as usize)..known.min(ids[ids.len() - 1] as usize + 1);
-                // SAFETY: ids ascend, so pieces have different ids.
+                let range = ids[0] as usize..ids[ids.len() - 1] as usize + 1;
+                // SAFETY: ids ascend, so pieces have different ranges, and the last one is known: it lies in all three lists, which are
+                // equally long. Each piece has its own notes.
                 let (boxes, filters, states, moved) = unsafe {
                     let moved = &mut shared.part(piece..piece + 1)[0];
-                    (
-                        boxes.part(range.clone()),
-                        filters.part(range.clone()),
-                        states.part(range.clone()),
-                        moved,
-                    )
+                    (boxes.part(range.clone()), filters.part(range.clone()), states.part(range), moved)
                 };
-                let Moved { changed, valid, is_filtered, absent } = moved;
-                let first = range.start as u32;
+                let Moved { changed, valid, is_filtered, is_noted, absent } = moved;
+                let first = ids[0];
                 let mut part =
                     Part { first, boxes, filters, states, changed, valid, is_filtered, is_noted: false };
                 for &id in ids {
@@ -146,19 +145,21 @@ impl World {
                     {
                         absent.push((id, aabb, filter));
                     }
+                    *is_noted |= part.is_noted;
                 }
             });
         }));
         let absent = self.take_moved(moved);
         done.unwrap_or_else(|panic| resume_unwind(panic));
-        absent
+        Some(absent)
     }
 
     /// Takes what threads have noted.
     fn take_moved(&mut self, moved: Vec<Moved>) -> Vec<(u32, Aabb, ProxyFilter)> {
         let mut all_absent = Vec::new();
-        for Moved { changed, valid, is_filtered, absent } in moved {
-            if !changed.is_empty() {
+        for Moved { changed, valid, is_filtered, is_noted, absent } in moved {
+            // A box that has changed before is not listed again.
+            if is_noted {
                 self.tree.expire();
             }
             self.changed.extend(changed);
@@ -248,6 +249,8 @@ struct Moved {
     /// Valid boxes that there are more, modulo 2^32.
     valid: u32,
     is_filtered: bool,
+    /// A box has changed.
+    is_noted: bool,
     absent: Vec<(u32, Aabb, ProxyFilter)>,
 }
 

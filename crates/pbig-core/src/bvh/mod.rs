@@ -60,6 +60,8 @@ pub struct BoxIndex {
     pub(crate) bounds: Vec<Aabb>,
     /// By node: free lanes of a leaf; 1 for any other.
     room: Vec<u8>,
+    /// The leaf whose lane was left last.
+    left: usize,
     /// By node: the sum of its extents at the last sort; infinite once it has grown past twice that.
     extents: Vec<f32>,
     grown: usize,

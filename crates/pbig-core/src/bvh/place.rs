@@ -7,6 +7,9 @@ use crate::Aabb;
 use crate::policy::bvh as policy;
 use crate::simd::dispatch;
 
+/// Children of the root below which a leaf with room is looked for. Parts for boxes of other sizes may lie in the same place.
+const TRIES: usize = 3;
+
 impl BoxIndex {
     /// Returns how many of some boxes came or have jumped: these need new places.
     pub(crate) fn arrivals(&self, boxes: &[Aabb], ids: &[u32]) -> usize {
@@ -46,6 +49,7 @@ impl BoxIndex {
         let leaf = place as usize / LANES;
         self.nodes[leaf].children[place as usize % LANES] = NONE;
         self.room[leaf] += 1;
+        self.left = leaf;
     }
 
     /// Returns true if a box is still near the place that it has: it meets the bounds of the node above its leaf.
@@ -66,7 +70,9 @@ impl BoxIndex {
             return self.put(leaf, id, aabb);
         }
         let last = self.nodes.len().checked_sub(1).filter(|last| *last >= self.end as usize);
-        let open = last.filter(|last| self.room[*last] > 0);
+        let is_open =
+            |leaf: &usize| *leaf >= self.end as usize && self.room.get(*leaf).is_some_and(|room| *room > 0);
+        let open = Some(self.left).filter(is_open).or(last.filter(is_open));
         let at = open.unwrap_or_else(|| {
             self.push(Node::EMPTY);
             self.nodes.len() - 1
@@ -78,28 +84,50 @@ impl BoxIndex {
     /// Puts a box into the first free lane of a leaf. The bounds do not know it yet.
     fn put(&mut self, leaf: usize, id: u32, aabb: &Aabb) {
         let node = &mut self.nodes[leaf];
-        let lane = node.children.iter().position(|child| *child == NONE).unwrap_or(LANES - 1);
+        let lane = node.children.iter().position(|child| *child == NONE).expect("the leaf has room");
         node.children[lane] = id;
         node.set(lane, aabb);
         self.room[leaf] -= 1;
         self.places[id as usize] = (leaf * LANES + lane) as u32;
     }
 
-    /// Returns the leaf with a free lane that grows least with a box: from the root on, the child that grows least. There is none if that
-    /// leads to full leaves, or if the leaf would become larger than the node above it.
+    /// Returns a leaf with a free lane that grows little with a box: below some children of the root that grow least.
     fn leaf_with_room(&self, aabb: &Aabb) -> Option<usize> {
-        let (mut above, mut at) = (None, self.root()? as usize);
+        let root = self.root()?;
+        if self.is_leaf(root) {
+            return (self.room[root as usize] > 0).then_some(root as usize);
+        }
+        let node = &self.nodes[root as usize];
+        let mut tried = 0;
+        (0..TRIES).find_map(|_| {
+            let lane = self.least_growing(node, aabb, tried)?;
+            tried |= 1 << lane;
+            self.leaf_below(root as usize, lane, aabb)
+        })
+    }
+
+    /// Returns the lane of a node whose child grows least with a box, of those that may have room and were not tried.
+    fn least_growing(&self, node: &Node, aabb: &Aabb, tried: u32) -> Option<usize> {
+        let (mut best, mut least) = (None, f32::INFINITY);
+        for lane in (0..LANES).filter(|lane| node.children[*lane] != NONE && tried >> lane & 1 == 0) {
+            let growth = node.growth(lane, aabb);
+            if self.room[node.children[lane] as usize] > 0 && growth < least {
+                (best, least) = (Some(lane), growth);
+            }
+        }
+        best
+    }
+
+    /// Returns the leaf with room below a child of a node: always the child that grows least. There is none if all there are full, or if
+    /// the leaf would become larger than twice the node above it.
+    fn leaf_below(&self, node: usize, lane: usize, aabb: &Aabb) -> Option<usize> {
+        let (mut above, mut at) = (node, self.nodes[node].children[lane] as usize);
         while !self.is_leaf(at as u32) {
-            let node = &self.nodes[at];
-            let has_room =
-                |lane: &usize| node.children[*lane] != NONE && self.room[node.children[*lane] as usize] > 0;
-            let growth = |lane: &usize| node.growth(*lane, aabb);
-            let lane =
-                (0..LANES).filter(has_room).min_by(|one, other| growth(one).total_cmp(&growth(other)))?;
-            (above, at) = (Some(at), node.children[lane] as usize);
+            let lane = self.least_growing(&self.nodes[at], aabb, 0)?;
+            (above, at) = (at, self.nodes[at].children[lane] as usize);
         }
         let extent = extent_sum(&self.bounds[at].union(aabb));
-        let is_small = above.is_none_or(|above| extent <= policy::GROWN_TO * extent_sum(&self.bounds[above]));
+        let is_small = extent <= policy::GROWN_TO * extent_sum(&self.bounds[above]);
         (is_small && self.room[at] > 0).then_some(at)
     }
 }

@@ -73,7 +73,7 @@ impl BoxIndex {
         &mut self,
         boxes: &[Aabb],
         changed: Option<&[u32]>,
-        present: impl Iterator<Item = u32>,
+        present: impl Iterator<Item = u32> + Clone,
     ) -> usize {
         self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
         let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < boxes.len();
@@ -194,7 +194,7 @@ impl BoxIndex {
     }
 
     /// Reads all boxes.
-    fn refit(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>) {
+    fn refit(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32> + Clone) {
         if self.end == 0 {
             return self.lay_out(boxes, present, None);
         }
@@ -206,7 +206,10 @@ impl BoxIndex {
         }
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         let has_come = |id: &u32| self.places[*id as usize] == NONE && boxes[*id as usize].is_valid();
-        let came: Vec<u32> = present.filter(has_come).collect();
+        let came: Vec<u32> = present.clone().filter(has_come).collect();
+        if came.len() > LANES * policy::loose_leaves(self.leaves) {
+            return self.lay_out(boxes, present, self.is_sorted.then_some(Order::SORTED));
+        }
         self.place(boxes, &came);
     }
 

@@ -2,6 +2,7 @@
 
 use super::query::Cast;
 use super::{BoxIndex, walk};
+use super::{LANES, NONE};
 use crate::simd::{Portable, Simd};
 use crate::{Aabb, Config, Engine, Finder};
 use rand::rngs::StdRng;
@@ -116,6 +117,32 @@ fn check(index: &BoxIndex, boxes: &[Aabb], rng: &mut StdRng, reach: f32) {
     check_portable(index, &start, velocity, (max_time, within));
 }
 
+/// Each box has one place, each node's bounds are around its boxes, and free lanes are counted.
+fn check_form(index: &BoxIndex, boxes: &[Aabb]) {
+    let mut placed = 0;
+    for (at, node) in index.nodes.iter().enumerate() {
+        let free = node.children.iter().filter(|child| **child == NONE).count();
+        let is_leaf = index.is_leaf(at as u32);
+        assert_eq!(usize::from(index.room[at]), if is_leaf { free } else { 1 }, "node {at}");
+        for (lane, &child) in node.children.iter().enumerate().filter(|(_, child)| **child != NONE) {
+            let inner = if is_leaf { boxes[child as usize] } else { index.bounds[child as usize] };
+            if is_leaf {
+                assert_eq!(index.places[child as usize] as usize, at * LANES + lane);
+                placed += usize::from(inner.is_valid());
+            } else {
+                assert_eq!(index.parents[child as usize] as usize, at * LANES + lane);
+            }
+            if inner.is_valid() {
+                assert!(
+                    node.get(lane) == inner && index.bounds[at].union(&inner) == index.bounds[at],
+                    "node {at}"
+                );
+            }
+        }
+    }
+    assert_eq!(placed, boxes.iter().filter(|aabb| aabb.is_valid()).count());
+}
+
 /// All wanted boxes were found, each once, and besides only such as `may_be`.
 fn compare(mut found: Vec<u32>, wanted: impl Iterator<Item = usize>, may_be: impl Fn(usize) -> bool) {
     found.sort_unstable();
@@ -143,10 +170,13 @@ fn answers_equal_a_scan_through_any_history() {
             }
             index.refresh(&boxes, (round % 2 == 0).then_some(&changed[..]));
             loose += index.loose().len();
+            check_form(&index, &boxes);
             (0..20).for_each(|_| check(&index, &boxes, &mut rng, 12.0));
             if round % 7 == 0 {
                 index.sort(&boxes);
                 sorts += 1;
+            } else if round % 7 == 3 {
+                index.refresh_sorted(&boxes, None, 0..boxes.len() as u32);
             }
         }
         assert!(sorts > 5 && (loose > 0 || n < 20), "{n} boxes: {sorts} sorts, {loose} loose leaves");

@@ -3,7 +3,7 @@
 use super::groups::Span;
 use crate::Pair;
 use crate::memory::{Scratch, ShrinkingVec};
-use crate::parallel::{SharedSlice, available_threads, piece_range, run};
+use crate::parallel::{SharedSlice, alone, available_threads, piece_range, run};
 use crate::policy::PARALLEL_FROM_BOXES;
 use crate::simd::prefetch;
 use std::sync::OnceLock;
@@ -159,12 +159,13 @@ impl Kept {
 
     /// Yields the partners of a box, sorted.
     pub(crate) fn partners(&self, id: u32) -> impl Iterator<Item = u32> {
-        let backward = self.backward.get_or_init(|| self.reversed());
+        // Others may wait for it.
+        let backward = self.backward.get_or_init(|| alone(|| self.reversed()));
         backward.row(id).iter().chain(self.forward.row(id)).copied()
     }
 
     /// Makes the rows of `b`, if there are none.
-    pub(crate) fn make_backward(&self) {
+    pub(crate) fn make_backward(&mut self) {
         self.backward.get_or_init(|| self.reversed());
     }
 

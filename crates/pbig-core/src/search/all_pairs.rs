@@ -137,10 +137,16 @@ impl AllPairs {
         let rule = request.rule(&found);
         if request.is_for_brute_force() {
             self.test_all(request, &rule, &mut outcome);
-        } else {
-            self.search(request, store, &rule, &mut outcome);
+            return self.finish(&rule, outcome);
         }
-        self.finish(&rule, outcome)
+        let before = (store.grids, store.trees);
+        self.search(request, store, &rule, &mut outcome);
+        let outcome = self.finish(&rule, outcome);
+        if outcome.end == End::TooManyPairs {
+            // Whether that or the budget ends a way first is a matter of time.
+            (store.grids, store.trees) = before;
+        }
+        outcome
     }
 
     /// Hands the last pairs to the receiver, and returns the outcome with its counts.
@@ -183,18 +189,18 @@ impl AllPairs {
 
     fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, outcome: &mut Outcome) {
         let is_forced = request.config.engine == Some(Engine::Tree);
-        let is_hard = request.is_repeated && store.grids.forbids(0);
+        let is_hard = request.is_repeated && store.grids.forbids(request.count());
         if !is_forced && !is_hard {
             let is_done = self.search_grid(request, store, rule, outcome);
-            store.grids.note(!is_done, 0);
+            store.grids.note(!is_done, request.count());
             if is_done {
                 return;
             }
         }
-        let is_hard = request.is_repeated && store.trees.forbids(0);
+        let is_hard = request.is_repeated && store.trees.forbids(request.count());
         if is_forced || !is_hard {
             let is_done = self.search_tree(request, store, rule, outcome);
-            store.trees.note(!is_done, 0);
+            store.trees.note(!is_done, request.count());
             if is_done {
                 return;
             }

@@ -50,6 +50,33 @@ fn a_thread_refits_the_tree_although_all_of_the_pool_wait_for_it() {
     receiver.recv_timeout(Duration::from_secs(300)).expect("no thread waits for ever");
 }
 
+/// As above, of who asks for the pairs of a box after a search.
+#[test]
+fn a_thread_makes_backward_rows_although_all_of_the_pool_wait_for_them() {
+    let (sender, receiver) = mpsc::channel();
+    std::thread::spawn(move || {
+        let mut broad_phase = BroadPhase::default();
+        let together = Barrier::new(rayon::current_num_threads() + 1);
+        for time in 0..40 {
+            for id in 0..BOXES {
+                let aabb = cube(id, 0.1 * time as f32).inflated(0.51);
+                broad_phase.set(id, aabb, ProxyFilter::ALL).expect("an id below the limit");
+            }
+            broad_phase.update().expect("few pairs");
+            let ask = || {
+                together.wait();
+                assert!(broad_phase.pairs_of(777).count() > 3);
+            };
+            std::thread::scope(|scope| {
+                scope.spawn(ask);
+                rayon::broadcast(|_| ask());
+            });
+        }
+        sender.send(()).expect("the test waits");
+    });
+    receiver.recv_timeout(Duration::from_secs(300)).expect("no thread waits for ever");
+}
+
 #[test]
 fn an_update_refits_the_tree_only_for_queries_like_those_since_the_last_one() {
     let (mut broad_phase, mut fresh) = (BroadPhase::default(), vec![]);
