@@ -209,10 +209,7 @@ impl World {
 
     /// Returns how many of the changed boxes need new places in the tree.
     pub(super) fn arrivals(&mut self) -> usize {
-        let mut tree = std::mem::take(&mut self.tree);
-        let arrivals = tree.arrivals(self);
-        self.tree = tree;
-        arrivals
+        self.tree.arrivals(&self.boxes, &self.changed)
     }
 
     /// Forgets all changes, after an update. The tree has noted them.
