@@ -234,8 +234,9 @@ impl AllPairs {
         outcome.plan = plan.told(sorted.boxes(), sorted.oversize_count());
         stage!("check");
         let most = search::grid_up_to_work(sorted.boxes());
+        // A receiver's search runs twice if it may fail, so it may as well take twice the budget.
         let is_sure = request.config.engine == Some(Engine::Grid)
-            || rule.receiver.is_some() && sorted.takes_at_most(most);
+            || rule.receiver.is_some() && sorted.takes_at_most(2 * most);
         let is_done = self.run_within((!is_sure).then_some(most), request, rule, outcome, |rule, hits| {
             sorted.search(rule, hits);
         });
