@@ -235,3 +235,21 @@ fn clusters_far_apart_take_no_more_work_than_their_crowds() {
         }
     }
 }
+/// Thin sheets that lie one behind the other in little room, and over each other: a tree has to cut the stack.
+#[test]
+fn sheets_in_a_thin_stack_are_cut_across_it() {
+    let sheets = |weight: u32, width: [f32; 3], half: [f32; 3]| {
+        let decades = 0.264_811_04;
+        Part { weight, corner: [7.0, 0.0, 0.0], width, half, growth: 0.5, decades, ..Part::CUBES }
+    };
+    let recipe = Recipe(vec![
+        sheets(19, [0.2, 143.0, 124.0], [1.3e-9, 55.5, 278.0]),
+        sheets(150, [0.23, 152.0, 399.0], [1.7e-8, 29.2, 528.0]),
+        sheets(150, [0.12, 81.5, 17.0], [1e-8, 17.8, 563.0]),
+    ]);
+    for n in SIZES {
+        let [tree, chosen] = [Some(Engine::Tree), None].map(|engine| search(&recipe.boxes(n, 1), engine));
+        println!("sheets in a thin stack, {n}: {tree:.2} in a tree, {chosen:.2}");
+        assert!(tree < 4.0 && chosen < RATIO_OF_GRIDS, "{n}: {tree} in a tree, {chosen}");
+    }
+}

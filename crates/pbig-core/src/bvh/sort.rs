@@ -139,6 +139,9 @@ const TIE: f64 = 0.01;
 /// Minimum own extent that counts, as a share of the middle one of three.
 const LEAST_EXTENT: f64 = 1.0 / 16.0;
 
+/// Minimum number of extents that flat boxes lie apart for the least extent to count: sheets in a thin stack are cut across it.
+const LEAST_APART: f64 = 4.0;
+
 /// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their own extents
 /// and the mean extents of all boxes in the same place. (If only their own extents counted, thin tiles would be cut into slabs as
 /// wide as the world. Slabs of tiles that stand in two directions all meet each other, and a ray across them meets all. Flat boxes at
@@ -148,7 +151,8 @@ fn best_axis(part: &Measure, others: &[Sampled]) -> usize {
     let mut sorted = *extents;
     sorted.sort_unstable_by(f64::total_cmp);
     let least = LEAST_EXTENT * sorted[1];
-    let extents: [f64; 3] = std::array::from_fn(|k| extents[k].max(least) + part.mean_within(others, k));
+    let own = |k: usize| extents[k].max(least.min(spread[k] / LEAST_APART));
+    let extents: [f64; 3] = std::array::from_fn(|k| own(k) + part.mean_within(others, k));
     let compare = |a: usize, b: usize| {
         let (one, other) = (spread[a] * extents[b], spread[b] * extents[a]);
         let is_tie = (one - other).abs() <= TIE * one.max(other);
