@@ -24,6 +24,10 @@ const FEW_LANES: u32 = 3;
 /// of a box with an id below it and one with another id, as of the last [`BoxIndex::sort_sets`].
 pub(super) fn find_pairs(index: &BoxIndex, split: Option<u32>, rule: &Rule<'_>, hits: &mut [Hits]) {
     let (leaves, earliest) = joined(index, split);
+    // Of two sets, the second may have no valid box: then a leaf that is the root has none to meet.
+    if split.is_some() && earliest == index.leaves {
+        return;
+    }
     let (last_leaves, leaves) = (last_leaves(index), leaves as usize);
     run_with(hits, leaves.div_ceil(PIECE), |hits, piece| {
         let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
