@@ -312,7 +312,7 @@ fn many_boxes_set_on_threads_are_those_set_one_by_one() {
             let planted = |id: u32| if id == n - 5 { panic!("planted") } else { place(id, 7) };
             let panics = std::panic::AssertUnwindSafe(|| many.set_many(&ids, planted));
             assert!(std::panic::catch_unwind(panics).is_err());
-            // What was set before is not lost.
+            // The boxes that were set before the panic are not lost.
             many.update().unwrap();
             let filters: Vec<_> =
                 ids.iter().map(|id| many.filter(*id).copied().unwrap_or_default()).collect();

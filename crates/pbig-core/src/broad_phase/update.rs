@@ -11,7 +11,7 @@ use crate::search::DeviceSlot;
 use crate::search::{End, Outcome};
 use crate::{Backend, Engine, Error, Plan};
 
-/// What finds the events.
+/// The ways to find events, with their buffers.
 struct Parts<'a> {
     device: &'a mut DeviceSlot,
     look_up: &'a mut LookUp,

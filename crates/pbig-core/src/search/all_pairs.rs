@@ -143,7 +143,7 @@ impl AllPairs {
         self.search(request, store, &rule, &mut outcome);
         let outcome = self.finish(&rule, outcome);
         if outcome.end == End::TooManyPairs {
-            // Whether that or the budget ends a way first is a matter of time.
+            // The limit of pairs or the budget may end a way first: threads differ in time.
             (store.grids, store.trees) = before;
         }
         outcome

@@ -24,10 +24,6 @@ const FEW_LANES: u32 = 3;
 /// of a box with an id below it and one with another id, as of the last [`BoxIndex::sort_sets`].
 pub(super) fn find_pairs(index: &BoxIndex, split: Option<u32>, rule: &Rule<'_>, hits: &mut [Hits]) {
     let (leaves, earliest) = joined(index, split);
-    // Of two sets, the second may have no valid box: then a leaf that is the root has none to meet.
-    if split.is_some() && earliest == index.leaves {
-        return;
-    }
     let (last_leaves, leaves) = (last_leaves(index), leaves as usize);
     run_with(hits, leaves.div_ceil(PIECE), |hits, piece| {
         let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
@@ -84,7 +80,8 @@ impl Join<'_, '_> {
         let bounds = index.bounds[leaf as usize];
         let earliest = leaf.max(self.earliest);
         let mut from = self.hits.found.pairs.len();
-        waiting.extend(index.root());
+        // A root that is a leaf may be of the first of two sets, too.
+        waiting.extend(index.root().filter(|root| self.last_leaves[*root as usize] >= earliest));
         while let Some(at) = waiting.pop() {
             self.hits.extra += WORK_OF_NODE;
             if index.is_leaf(at) {

@@ -25,38 +25,45 @@ fn met(broad_phase: &BroadPhase, aabb: &Aabb) -> Vec<u32> {
     met
 }
 
+/// Asks on a thread outside the pool and on all of the pool at once.
+fn ask_together(ask: &(impl Fn() + Sync)) {
+    let together = Barrier::new(rayon::current_num_threads() + 1);
+    let ask = || {
+        together.wait();
+        ask();
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(ask);
+        rayon::broadcast(|_| ask());
+    });
+}
+
 /// A thread that refits the tree must not wait for one of the pool, because all of these may wait for the refit.
 #[test]
 fn a_thread_refits_the_tree_although_all_of_the_pool_wait_for_it() {
     let (sender, receiver) = mpsc::channel();
     std::thread::spawn(move || {
         let mut broad_phase = BroadPhase::default();
-        let together = Barrier::new(rayon::current_num_threads() + 1);
         for time in 0..100 {
             step(&mut broad_phase, time as f32, 1);
-            // So that the update has not made it fresh.
+            // A change after the update makes the tree stale.
             broad_phase.set_aabb(0, cube(0, time as f32 + 0.1));
             let ask = || {
-                together.wait();
                 assert_eq!(met(&broad_phase, &cube(7, time as f32)), [7]);
             };
-            std::thread::scope(|scope| {
-                scope.spawn(ask);
-                rayon::broadcast(|_| ask());
-            });
+            ask_together(&ask);
         }
         sender.send(()).expect("the test waits");
     });
     receiver.recv_timeout(Duration::from_secs(300)).expect("no thread waits for ever");
 }
 
-/// As above, of who asks for the pairs of a box after a search.
+/// The first question for the pairs of a box after a search makes backward rows, by the same rule.
 #[test]
 fn a_thread_makes_backward_rows_although_all_of_the_pool_wait_for_them() {
     let (sender, receiver) = mpsc::channel();
     std::thread::spawn(move || {
         let mut broad_phase = BroadPhase::default();
-        let together = Barrier::new(rayon::current_num_threads() + 1);
         for time in 0..40 {
             for id in 0..BOXES {
                 let aabb = cube(id, 0.1 * time as f32).inflated(0.51);
@@ -64,13 +71,9 @@ fn a_thread_makes_backward_rows_although_all_of_the_pool_wait_for_them() {
             }
             broad_phase.update().expect("few pairs");
             let ask = || {
-                together.wait();
                 assert!(broad_phase.pairs_of(777).count() > 3);
             };
-            std::thread::scope(|scope| {
-                scope.spawn(ask);
-                rayon::broadcast(|_| ask());
-            });
+            ask_together(&ask);
         }
         sender.send(()).expect("the test waits");
     });
