@@ -1,7 +1,7 @@
-//! The inner loops by AVX2, which all x86-64 processors of the last ten years have.
+//! Primitives of AVX2, which all x86-64 processors of the last ten years have.
 
-use super::codes::{APART, MAX_STEP, MIN_STEP, Steps, TOMBSTONE};
-use super::{BLOCK, Eight, EightBoxes, Simd};
+use super::codes::{MAX_STEP, MIN_STEP, Steps};
+use super::{BLOCK, Eight, Primitives};
 use crate::Aabb;
 use std::arch::x86_64::*;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -22,7 +22,7 @@ impl Found {
 }
 
 impl Avx2 {
-    /// Returns a proof if the processor has all instructions that [`Avx2::run`] enables.
+    /// Returns a proof if the processor has all instructions that its `run` enables.
     #[inline(always)]
     pub(crate) fn detect() -> Option<Self> {
         match FOUND.load(Ordering::Relaxed) {
@@ -43,38 +43,142 @@ impl Avx2 {
         FOUND.store(if has_all { Found::YES } else { Found::NO }, Ordering::Relaxed);
         has_all.then_some(Self(()))
     }
+}
 
-    /// Calls a function that is inlined here, compiled for these instructions.
+/// Evaluates an expression of intrinsics in a method of a proof.
+macro_rules! by {
+    ($expression:expr) => {
+        // SAFETY: `self` proves the instructions; each load is of an array that is borrowed.
+        unsafe { $expression }
+    };
+}
+
+impl Primitives for Avx2 {
+    type Row = __m256i;
+
     #[inline]
-    pub(crate) fn run<T>(self, work: impl FnOnce() -> T) -> T {
+    fn run<T>(self, work: impl FnOnce() -> T) -> T {
         #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
         fn compiled<T>(work: impl FnOnce() -> T) -> T {
             work()
         }
-        // SAFETY: `self` proves that the processor has these instructions.
-        unsafe { compiled(work) }
+        by!(compiled(work))
     }
-}
 
-/// By mask: the numbers of its set bits, a byte each, lowest first.
-static SET_BITS: [u64; 256] = {
-    let mut table = [0; 256];
-    let mut mask = 0;
-    while mask < 256 {
-        let (mut bit, mut shift) = (0, 0);
-        while bit < 8 {
-            if mask >> bit & 1 == 1 {
-                table[mask] |= (bit as u64) << shift;
-                shift += 8;
-            }
-            bit += 1;
-        }
-        mask += 1;
+    #[inline(always)]
+    fn load(self, row: &Eight) -> __m256i {
+        by!(_mm256_loadu_si256(row.as_ptr().cast()))
     }
-    table
-};
 
-impl Simd for Avx2 {
+    #[inline(always)]
+    fn store(self, row: __m256i) -> Eight {
+        bytemuck::cast(row)
+    }
+
+    #[inline(always)]
+    fn splat(self, number: u32) -> __m256i {
+        by!(_mm256_set1_epi32(number as i32))
+    }
+
+    #[inline(always)]
+    fn widen(self, bytes: u64) -> __m256i {
+        by!(_mm256_cvtepu8_epi32(_mm_cvtsi64_si128(bytes as i64)))
+    }
+
+    #[inline(always)]
+    fn add(self, a: __m256i, b: __m256i) -> __m256i {
+        by!(_mm256_add_epi32(a, b))
+    }
+
+    #[inline(always)]
+    fn and(self, a: __m256i, b: __m256i) -> __m256i {
+        by!(_mm256_and_si256(a, b))
+    }
+
+    #[inline(always)]
+    fn or(self, a: __m256i, b: __m256i) -> __m256i {
+        by!(_mm256_or_si256(a, b))
+    }
+
+    #[inline(always)]
+    fn not(self, a: __m256i) -> __m256i {
+        by!(_mm256_xor_si256(a, _mm256_set1_epi32(-1)))
+    }
+
+    #[inline(always)]
+    fn min(self, a: __m256i, b: __m256i) -> __m256i {
+        by!(_mm256_min_epu32(a, b))
+    }
+
+    #[inline(always)]
+    fn max(self, a: __m256i, b: __m256i) -> __m256i {
+        by!(_mm256_max_epu32(a, b))
+    }
+
+    #[inline(always)]
+    fn equal(self, a: __m256i, b: __m256i) -> __m256i {
+        by!(_mm256_cmpeq_epi32(a, b))
+    }
+
+    #[inline(always)]
+    fn at_most_f32(self, a: __m256i, b: __m256i) -> __m256i {
+        by!({
+            let (a, b) = (_mm256_castsi256_ps(a), _mm256_castsi256_ps(b));
+            _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b))
+        })
+    }
+
+    #[inline(always)]
+    fn select(self, mask: __m256i, set: __m256i, unset: __m256i) -> __m256i {
+        by!(_mm256_blendv_epi8(unset, set, mask))
+    }
+
+    #[inline(always)]
+    fn permute(self, row: __m256i, lanes: __m256i) -> __m256i {
+        by!(_mm256_permutevar8x32_epi32(row, lanes))
+    }
+
+    #[inline(always)]
+    fn bits(self, mask: __m256i) -> u32 {
+        by!(_mm256_movemask_ps(_mm256_castsi256_ps(mask)) as u32)
+    }
+
+    #[inline(always)]
+    fn least(self, row: __m256i) -> u32 {
+        by!({
+            let four = _mm_min_epu32(_mm256_castsi256_si128(row), _mm256_extracti128_si256::<1>(row));
+            let two = _mm_min_epu32(four, _mm_shuffle_epi32::<0b01_00_11_10>(four));
+            _mm_cvtsi128_si32(_mm_min_epu32(two, _mm_shuffle_epi32::<0b10_11_00_01>(two))) as u32
+        })
+    }
+
+    #[inline(always)]
+    fn free(self, add: u64, taken: u64, codes: &[u64; BLOCK]) -> u32 {
+        by!({
+            let (add, taken) = (_mm256_set1_epi64x(add as i64), _mm256_set1_epi64x(taken as i64));
+            // A closure could be left out of line, for which the loops around it are several times as slow.
+            let (low, high) = (codes[0..].as_ptr().cast(), codes[BLOCK / 2..].as_ptr().cast());
+            let low = _mm256_and_si256(_mm256_add_epi64(add, _mm256_loadu_si256(low)), taken);
+            let high = _mm256_and_si256(_mm256_add_epi64(add, _mm256_loadu_si256(high)), taken);
+            let low = _mm256_cmpeq_epi64(low, _mm256_setzero_si256());
+            let high = _mm256_cmpeq_epi64(high, _mm256_setzero_si256());
+            let low = _mm256_movemask_pd(_mm256_castsi256_pd(low)) as u32;
+            let high = _mm256_movemask_pd(_mm256_castsi256_pd(high)) as u32;
+            low | high << (BLOCK / 2)
+        })
+    }
+
+    #[inline(always)]
+    fn transpose(self, boxes: [&Aabb; BLOCK]) -> [__m256i; 6] {
+        by!({
+            // Two boxes, four lanes apart, share registers.
+            let ((a, a_max), (b, b_max)) = (pair(boxes[0], boxes[4]), pair(boxes[1], boxes[5]));
+            let ((c, c_max), (d, d_max)) = (pair(boxes[2], boxes[6]), pair(boxes[3], boxes[7]));
+            let ([x, y, z], [max_x, max_y, max_z]) = (axes(a, b, c, d), axes(a_max, b_max, c_max, d_max));
+            [x, y, z, max_x, max_y, max_z]
+        })
+    }
+
     #[inline(always)]
     fn steps(self, origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps) {
         // SAFETY: `self` proves the instructions; each load is of an array of four.
@@ -135,182 +239,25 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn test(self, query: u64, codes: &[u64; BLOCK]) -> u32 {
-        // SAFETY: `self` proves the instructions; each load is of a half of the codes.
-        unsafe {
-            let query = _mm256_set1_epi64x(query as i64);
-            let apart = _mm256_set1_epi64x((APART | TOMBSTONE) as i64);
-            // A closure could be left out of line, for which the loops around it are several times as slow.
-            let (low, high) = (codes[0..].as_ptr().cast(), codes[BLOCK / 2..].as_ptr().cast());
-            let low = _mm256_and_si256(_mm256_add_epi64(query, _mm256_loadu_si256(low)), apart);
-            let high = _mm256_and_si256(_mm256_add_epi64(query, _mm256_loadu_si256(high)), apart);
-            let low = _mm256_cmpeq_epi64(low, _mm256_setzero_si256());
-            let high = _mm256_cmpeq_epi64(high, _mm256_setzero_si256());
-            let low = _mm256_movemask_pd(_mm256_castsi256_pd(low)) as u32;
-            let high = _mm256_movemask_pd(_mm256_castsi256_pd(high)) as u32;
-            low | high << (BLOCK / 2)
-        }
+    fn lowest(self, rows: [__m256i; 3]) -> [f32; 3] {
+        by!(folded(rows, _mm_min_ps))
     }
 
     #[inline(always)]
-    fn expand(self, query: u32, first: u32, mask: u32, queries: &mut Eight, places: &mut Eight) -> usize {
-        // SAFETY: `self` proves the instructions; each store is of eight numbers.
-        unsafe {
-            let bits = _mm_cvtsi64_si128(SET_BITS[mask as usize & 255] as i64);
-            let found = _mm256_add_epi32(_mm256_set1_epi32(first as i32), _mm256_cvtepu8_epi32(bits));
-            _mm256_storeu_si256(queries.as_mut_ptr().cast(), _mm256_set1_epi32(query as i32));
-            _mm256_storeu_si256(places.as_mut_ptr().cast(), found);
-        }
-        mask.count_ones() as usize
+    fn highest(self, rows: [__m256i; 3]) -> [f32; 3] {
+        by!(folded(rows, _mm_max_ps))
     }
+}
 
-    #[inline(always)]
-    fn sorted_short(self, row: &Eight, len: usize) -> Eight {
-        // SAFETY: `self` proves the instructions; the load is of eight numbers.
-        unsafe {
-            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            // Numbers behind the row take part as the largest ones.
-            let behind = _mm256_cmpgt_epi32(lanes, _mm256_set1_epi32(len as i32 - 1));
-            bytemuck::cast(sorted(_mm256_or_si256(_mm256_loadu_si256(row.as_ptr().cast()), behind)))
-        }
-    }
-
-    #[inline(always)]
-    fn gather(self, list: &[Aabb], at: &Eight) -> EightBoxes {
-        // SAFETY: `self` proves the instructions.
-        unsafe {
-            let corners = |lane: usize| list.get(at[lane] as usize).unwrap_or(&Aabb::NOWHERE).corners();
-            // A pair of boxes four lanes apart shares registers.
-            let pair = |lane: usize| {
-                let ((min, max), (other_min, other_max)) = (corners(lane), corners(lane + 4));
-                (_mm256_set_m128(other_min, min), _mm256_set_m128(other_max, max))
-            };
-            let ((a, a_max), (b, b_max), (c, c_max), (d, d_max)) = (pair(0), pair(1), pair(2), pair(3));
-            let (min, max) = (transposed(a, b, c, d), transposed(a_max, b_max, c_max, d_max));
-            let valid = |k: usize| _mm256_cmp_ps::<_CMP_LE_OQ>(min[k], max[k]);
-            let valid = _mm256_and_ps(_mm256_and_ps(valid(0), valid(1)), valid(2));
-            let (most, least) = (_mm256_set1_ps(f32::INFINITY), _mm256_set1_ps(f32::NEG_INFINITY));
-            let low = |k: usize| -> [f32; BLOCK] { bytemuck::cast(_mm256_blendv_ps(most, min[k], valid)) };
-            let high = |k: usize| -> [f32; BLOCK] { bytemuck::cast(_mm256_blendv_ps(least, max[k], valid)) };
-            [low(0), low(1), low(2), high(0), high(1), high(2)]
-        }
-    }
-
-    #[inline(always)]
-    fn around(self, boxes: &EightBoxes) -> Aabb {
-        // SAFETY: `self` proves the instructions; each load is of eight numbers.
-        unsafe {
-            let halves = |k: usize| {
-                let row = _mm256_loadu_ps(boxes[k].as_ptr());
-                (_mm256_castps256_ps128(row), _mm256_extractf128_ps::<1>(row))
-            };
-            let low = |k: usize| _mm_min_ps(halves(k).0, halves(k).1);
-            let high = |k: usize| _mm_max_ps(halves(k).0, halves(k).1);
-            let ([a, b, c], [d, e, f]) = ([low(0), low(1), low(2)], [high(3), high(4), high(5)]);
-            let two = |a, b, of: unsafe fn(__m128, __m128) -> __m128| {
-                of(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b))
-            };
-            let four =
-                |a, b, of: unsafe fn(__m128, __m128) -> __m128| of(_mm_movelh_ps(a, b), _mm_movehl_ps(b, a));
-            let min: [f32; 4] =
-                bytemuck::cast(four(two(a, b, _mm_min_ps), two(c, c, _mm_min_ps), _mm_min_ps));
-            let max: [f32; 4] =
-                bytemuck::cast(four(two(d, e, _mm_max_ps), two(f, f, _mm_max_ps), _mm_max_ps));
-            Aabb::new([min[0], min[1], min[2]], [max[0], max[1], max[2]])
-        }
-    }
-
-    #[inline(always)]
-    fn nearest(self, keys: &[f32; BLOCK], limits: &[f32; BLOCK]) -> Option<usize> {
-        // SAFETY: `self` proves the instructions.
-        let least = unsafe {
-            let words = words(keys, limits).1;
-            let four = _mm_min_epu32(_mm256_castsi256_si128(words), _mm256_extracti128_si256::<1>(words));
-            let two = _mm_min_epu32(four, _mm_shuffle_epi32::<0b01_00_11_10>(four));
-            _mm_cvtsi128_si32(_mm_min_epu32(two, _mm_shuffle_epi32::<0b10_11_00_01>(two))) as u32
-        };
-        (least != u32::MAX).then_some(least as usize % BLOCK)
-    }
-
-    #[inline(always)]
-    fn farthest_first(
-        self,
-        keys: &[f32; BLOCK],
-        limits: &[f32; BLOCK],
-        values: &Eight,
-    ) -> ([f32; BLOCK], Eight, usize) {
-        // SAFETY: `self` proves the instructions; the load is of eight numbers.
-        unsafe {
-            let (found, words) = words(keys, limits);
-            let all_bits = _mm256_set1_epi32(-1);
-            let beyond = _mm256_cmpeq_epi32(words, all_bits);
-            let count =
-                BLOCK - (_mm256_movemask_ps(_mm256_castsi256_ps(beyond)) as u32).count_ones() as usize;
-            // The largest word is to be first.
-            let order = sorted(_mm256_or_si256(_mm256_xor_si256(words, all_bits), beyond));
-            let order = _mm256_xor_si256(order, all_bits);
-            let values = _mm256_loadu_si256(values.as_ptr().cast());
-            let keys = _mm256_permutevar8x32_ps(found, order);
-            let values = _mm256_permutevar8x32_epi32(values, order);
-            (bytemuck::cast(keys), bytemuck::cast(values), count)
-        }
-    }
-
-    #[inline(always)]
-    fn same_short(self, one: &Eight, other: &Eight, len: usize) -> bool {
-        // SAFETY: `self` proves the instructions; each load is of eight numbers.
-        unsafe {
-            let same = _mm256_cmpeq_epi32(
-                _mm256_loadu_si256(one.as_ptr().cast()),
-                _mm256_loadu_si256(other.as_ptr().cast()),
-            );
-            let same = _mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32;
-            !same & ((1 << len) - 1) == 0
-        }
-    }
-
-    #[inline(always)]
-    fn absent(self, numbers: &Eight, others: &Eight, len: usize) -> u32 {
-        // SAFETY: `self` proves the instructions; each load is of eight numbers.
-        unsafe {
-            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            let behind = _mm256_cmpgt_epi32(lanes, _mm256_set1_epi32(len as i32 - 1));
-            let numbers = _mm256_loadu_si256(numbers.as_ptr().cast());
-            // Lanes behind the row get the largest number, which is not an id.
-            let mut others = _mm256_or_si256(_mm256_loadu_si256(others.as_ptr().cast()), behind);
-            let next = _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 0);
-            let mut found = _mm256_cmpeq_epi32(numbers, others);
-            for _ in 1..8 {
-                others = _mm256_permutevar8x32_epi32(others, next);
-                found = _mm256_or_si256(found, _mm256_cmpeq_epi32(numbers, others));
-            }
-            !_mm256_movemask_ps(_mm256_castsi256_ps(found)) as u32 & 255
-        }
-    }
-
-    #[inline(always)]
-    fn at_most(self, numbers: &[f32; BLOCK], others: &[f32; BLOCK]) -> u32 {
-        // SAFETY: `self` proves the instructions; each load is of eight numbers.
-        unsafe {
-            let (numbers, others) = (_mm256_loadu_ps(numbers.as_ptr()), _mm256_loadu_ps(others.as_ptr()));
-            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(numbers, others)) as u32
-        }
-    }
-
-    #[inline(always)]
-    fn overlaps_eight(self, boxes: &EightBoxes, aabb: &Aabb) -> u32 {
-        // SAFETY: `self` proves the instructions; each load is of eight numbers.
-        unsafe {
-            let mut overlaps = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
-            for k in 0..3 {
-                let (min, max) = (_mm256_loadu_ps(boxes[k].as_ptr()), _mm256_loadu_ps(boxes[k + 3].as_ptr()));
-                let below = _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_set1_ps(aabb.min[k]), max);
-                let above = _mm256_cmp_ps::<_CMP_LE_OQ>(min, _mm256_set1_ps(aabb.max[k]));
-                overlaps = _mm256_and_ps(overlaps, _mm256_and_ps(below, above));
-            }
-            _mm256_movemask_ps(overlaps) as u32
-        }
-    }
+/// Returns the lower and the upper corners of two boxes.
+///
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn pair(one: &Aabb, other: &Aabb) -> (__m256, __m256) {
+    let ((min, max), (other_min, other_max)) = (one.corners(), other.corners());
+    // SAFETY: the caller's promise.
+    unsafe { (_mm256_set_m128(other_min, min), _mm256_set_m128(other_max, max)) }
 }
 
 /// Returns x, y and z of four registers, each of which has x, y, z and anything of two boxes.
@@ -318,51 +265,43 @@ impl Simd for Avx2 {
 /// # Safety
 /// The processor has AVX2.
 #[inline(always)]
-unsafe fn transposed(a: __m256, b: __m256, c: __m256, d: __m256) -> [__m256; 3] {
+unsafe fn axes(a: __m256, b: __m256, c: __m256, d: __m256) -> [__m256i; 3] {
     // SAFETY: the caller's promise.
     unsafe {
         let (xy, more) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
         let z = _mm256_shuffle_ps::<0b01_00_01_00>(_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
-        [_mm256_shuffle_ps::<0b01_00_01_00>(xy, more), _mm256_shuffle_ps::<0b11_10_11_10>(xy, more), z]
+        let (x, y) =
+            (_mm256_shuffle_ps::<0b01_00_01_00>(xy, more), _mm256_shuffle_ps::<0b11_10_11_10>(xy, more));
+        [_mm256_castps_si256(x), _mm256_castps_si256(y), _mm256_castps_si256(z)]
     }
 }
 
-/// Returns eight keys, and words in their order with the lane in the last bits: all bits for a key beyond its limit.
+/// Folds each of three rows. The rows share the steps of a fold.
 ///
 /// # Safety
 /// The processor has AVX2.
 #[inline(always)]
-unsafe fn words(keys: &[f32; BLOCK], limits: &[f32; BLOCK]) -> (__m256, __m256i) {
-    // SAFETY: the caller's promise; each load is of eight numbers.
-    unsafe {
-        let (keys, limits) = (_mm256_loadu_ps(keys.as_ptr()), _mm256_loadu_ps(limits.as_ptr()));
-        let beyond = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_NLE_UQ>(keys, limits));
-        let key = _mm256_and_si256(_mm256_castps_si256(keys), _mm256_set1_epi32(!7));
-        let word = _mm256_or_si256(key, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
-        (keys, _mm256_or_si256(word, beyond))
-    }
-}
-
-/// Sorts eight numbers by a network of six steps.
-///
-/// # Safety
-/// The processor has AVX2.
-#[inline(always)]
-unsafe fn sorted(v: __m256i) -> __m256i {
-    macro_rules! step {
-        ($row:ident, $swapped:expr, $upper:literal) => {{
-            let swapped = $swapped;
-            _mm256_blend_epi32::<$upper>(_mm256_min_epu32($row, swapped), _mm256_max_epu32($row, swapped))
-        }};
-    }
+unsafe fn folded([a, b, c]: [__m256i; 3], of: unsafe fn(__m128, __m128) -> __m128) -> [f32; 3] {
     // SAFETY: the caller's promise.
     unsafe {
-        let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010);
-        let v = step!(v, _mm256_shuffle_epi32::<0b00_01_10_11>(v), 0b1100_1100);
-        let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010);
-        let reversed = _mm256_permute4x64_epi64::<0b01_00_11_10>(_mm256_shuffle_epi32::<0b00_01_10_11>(v));
-        let v = step!(v, reversed, 0b1111_0000);
-        let v = step!(v, _mm256_shuffle_epi32::<0b01_00_11_10>(v), 0b1100_1100);
-        step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010)
+        let (a, b, c) = (halves(a), halves(b), halves(c));
+        let (a, b, c) = (of(a.0, a.1), of(b.0, b.1), of(c.0, c.1));
+        let ab = of(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b));
+        let cc = of(_mm_unpacklo_ps(c, c), _mm_unpackhi_ps(c, c));
+        let abc: [f32; 4] = bytemuck::cast(of(_mm_movelh_ps(ab, cc), _mm_movehl_ps(cc, ab)));
+        [abc[0], abc[1], abc[2]]
+    }
+}
+
+/// Returns both halves of a row of floats.
+///
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn halves(row: __m256i) -> (__m128, __m128) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let row = _mm256_castsi256_ps(row);
+        (_mm256_castps256_ps128(row), _mm256_extractf128_ps::<1>(row))
     }
 }

@@ -1,7 +1,5 @@
 //! Steps and codes: the place of a box in integers. See the cells of the grid.
 
-use crate::Aabb;
-
 /// Coordinates in steps, an axis a lane; the fourth lane is unused.
 pub(crate) type Steps = [i32; 4];
 
@@ -16,18 +14,36 @@ pub(super) const APART: u64 = 0x1004_0100_1004_0100;
 /// A code that matches no query, for slots whose box has moved away. Its two bits are never set otherwise.
 pub(crate) const TOMBSTONE: u64 = 1 << 30 | 1 << 62;
 
-/// Returns both corners of a box in steps, on any processor.
+/// By mask: the numbers of its set bits, a byte each, lowest first.
+pub(super) static SET_BITS: [u64; 256] = {
+    let mut table = [0; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut bit, mut shift) = (0, 0);
+        while bit < 8 {
+            if mask >> bit & 1 == 1 {
+                table[mask] |= (bit as u64) << shift;
+                shift += 8;
+            }
+            bit += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
+/// Returns a corner in steps.
 #[inline(always)]
-pub(super) fn steps_portable(origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps) {
-    let step = |k: usize, x: f32| {
-        let x = (f64::from(x) - origin[k]) * scale[k];
+pub(super) fn steps(origin: &[f64; 4], scale: &[f64; 4], &[x, y, z]: &[f32; 3]) -> Steps {
+    let (corner, mut steps) = ([x, y, z, 0.0], [0; 4]);
+    for k in 0..4 {
+        let x = (f64::from(corner[k]) - origin[k]) * scale[k];
         // Comparisons rather than `clamp`, which keeps a NaN.
         let x = if x < MAX_STEP { x } else { MAX_STEP };
         let x = if x > MIN_STEP { x } else { MIN_STEP };
-        round_to_i32(x)
-    };
-    let corner = |corner: &[f32; 3]| [step(0, corner[0]), step(1, corner[1]), step(2, corner[2]), 0];
-    (corner(&aabb.min), corner(&aabb.max))
+        steps[k] = round_to_i32(x);
+    }
+    steps
 }
 
 /// Rounds to the nearest integer, ties to even, for |x| < 2^31: the sum's lowest bits are the integer.
@@ -37,16 +53,24 @@ fn round_to_i32(x: f64) -> i32 {
     (x + SHIFT).to_bits() as i32
 }
 
+/// See [`Primitives::key`](super::Primitives::key).
+#[inline(always)]
+pub(super) fn key(dims: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32 {
+    let mut cell = point.map(|step| step >> shift);
+    for k in 0..3 {
+        cell[k] = if wraps { cell[k] & (dims[k] - 1) } else { cell[k].clamp(1, dims[k] - 2) };
+    }
+    ((cell[2] * dims[1] + cell[1]) * dims[0] + cell[0]) as u32
+}
+
 /// Returns the code of a box: `-low` and `high` on each axis, modulo 512 steps, ten bits a field.
 #[inline(always)]
-pub(super) fn code_portable(low: Steps, high: Steps) -> u64 {
-    let field = |step: i32, k: usize| u64::from(step as u32 & 511) << (10 * k);
-    let half = |of: Steps, sign: i32| {
-        field(sign.wrapping_mul(of[0]), 0)
-            | field(sign.wrapping_mul(of[1]), 1)
-            | field(sign.wrapping_mul(of[2]), 2)
+pub(super) fn code(low: Steps, high: Steps) -> u64 {
+    let half = |of: [i32; 4]| {
+        let field = |k: usize| (of[k] as u32 & 511) << (10 * k);
+        field(0) | field(1) | field(2)
     };
-    half(low, -1) | half(high, 1) << 32
+    u64::from(half(low.map(i32::wrapping_neg))) | u64::from(half(high)) << 32
 }
 
 /// Returns the query that finds the codes of boxes which overlap the box of `code`.

@@ -1,14 +1,23 @@
-//! The inner loops' instructions: AVX2 where the processor has it, chosen at run time; plain Rust elsewhere.
+//! Instructions of the inner loops: AVX2 where the processor has it, found at run time; NEON on ARM; plain Rust elsewhere.
+//!
+//! An instruction set has [`Primitives`] on registers of eight numbers. The steps of the loops, [`Simd`], are written once on these.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod codes;
+mod kernels;
+#[cfg(target_arch = "aarch64")]
+mod neon;
+mod portable;
 
 use crate::Aabb;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
-use codes::{APART, code_portable, steps_portable};
 pub(crate) use codes::{Steps, TOMBSTONE, query_of};
+pub(crate) use kernels::Simd;
+#[cfg(target_arch = "aarch64")]
+use neon::Neon;
+pub(crate) use portable::Portable;
 
 /// Codes tested together: a cache line of them.
 pub(crate) const BLOCK: usize = 8;
@@ -16,63 +25,130 @@ pub(crate) const BLOCK: usize = 8;
 /// Eight boxes axis by axis: three rows of lower corners, three of upper ones.
 pub(crate) type EightBoxes = [[f32; BLOCK]; 6];
 
-/// A register of ids or places.
+/// Eight ids or places.
 pub(crate) type Eight = [u32; BLOCK];
 
-/// One implementation of the inner loops. A value is a proof that the processor has the instructions.
-pub(crate) trait Simd: Copy {
+/// Instructions of a processor. A value is a proof that the processor has them.
+pub(crate) trait Primitives: Copy {
+    /// Eight numbers of 32 bits: integers, floats by their bits, or a mask, in which all bits of a lane are equal.
+    type Row: Copy;
+
+    /// Calls a function that is inlined here, compiled for the instructions.
+    fn run<T>(self, work: impl FnOnce() -> T) -> T;
+
+    /// Reads eight numbers.
+    fn load(self, row: &Eight) -> Self::Row;
+
+    /// Returns the eight numbers of a row.
+    fn store(self, row: Self::Row) -> Eight;
+
+    /// Returns a row of eight equal numbers.
+    fn splat(self, number: u32) -> Self::Row;
+
+    /// Returns the eight bytes of a word as numbers.
+    fn widen(self, bytes: u64) -> Self::Row;
+
+    /// Adds integers, and wraps.
+    fn add(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns the bits that are set in both rows.
+    fn and(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns the bits that are set in one row at least.
+    fn or(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns the bits that are not set.
+    fn not(self, a: Self::Row) -> Self::Row;
+
+    /// Returns the lesser integers, without sign.
+    fn min(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns the greater integers, without sign.
+    fn max(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns a mask of the integers that are equal.
+    fn equal(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns a mask of the floats that are at most the other one. No number is at most a NaN.
+    fn at_most_f32(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns the numbers of one row where a mask is set, and those of another elsewhere.
+    fn select(self, mask: Self::Row, set: Self::Row, unset: Self::Row) -> Self::Row;
+
+    /// Returns the numbers that lie in the named lanes. Only the last three bits of a name count.
+    fn permute(self, row: Self::Row, lanes: Self::Row) -> Self::Row;
+
+    /// Returns a bit for each lane of a mask.
+    fn bits(self, mask: Self::Row) -> u32;
+
+    /// Returns the least of eight integers, without sign.
+    fn least(self, row: Self::Row) -> u32;
+
+    /// Adds a number to each of eight codes. Returns a bit for each sum that has no bit of `taken`.
+    fn free(self, add: u64, taken: u64, codes: &[u64; BLOCK]) -> u32;
+
+    /// Returns eight boxes axis by axis.
+    fn transpose(self, boxes: [&Aabb; BLOCK]) -> [Self::Row; 6];
+
+    /// Returns the least float of each row. No float is a NaN.
+    fn lowest(self, rows: [Self::Row; 3]) -> [f32; 3];
+
+    /// Returns the greatest float of each row. No float is a NaN.
+    fn highest(self, rows: [Self::Row; 3]) -> [f32; 3];
+
     /// Returns both corners of a box in steps: `scale` of them in a length unit, from `origin` on.
-    fn steps(self, origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps);
+    #[inline(always)]
+    fn steps(self, origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps) {
+        (codes::steps(origin, scale, &aabb.min), codes::steps(origin, scale, &aabb.max))
+    }
 
     /// Returns the number, row by row, of the cell of a point. A cell has `1 << shift` steps, and there are `dims` of them by axis. The
     /// point is wrapped into these, or clamped into those that have neighbours on both sides.
-    fn key(self, dims: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32;
+    #[inline(always)]
+    fn key(self, dims: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32 {
+        codes::key(dims, shift, wraps, point)
+    }
 
     /// Returns true for a valid box with these extents at most.
-    fn fits(self, most: &[f32; 3], aabb: &Aabb) -> bool;
+    #[inline(always)]
+    fn fits(self, most: &[f32; 3], aabb: &Aabb) -> bool {
+        let extent: [f32; 3] = std::array::from_fn(|k| aabb.max[k] - aabb.min[k]);
+        let fits = |k: usize| (extent[k] >= 0.0) & (extent[k] <= most[k]);
+        fits(0) & fits(1) & fits(2)
+    }
 
     /// Returns the code of a box.
-    fn code(self, low: Steps, high: Steps) -> u64;
+    #[inline(always)]
+    fn code(self, low: Steps, high: Steps) -> u64 {
+        codes::code(low, high)
+    }
 
-    /// Returns a bit for each of eight codes: set if the two boxes may overlap. Tombstones never do.
-    fn test(self, query: u64, codes: &[u64; BLOCK]) -> u32;
+    /// Returns eight integers, sorted, by a network of six steps.
+    #[inline(always)]
+    fn sorted(self, row: Self::Row) -> Self::Row {
+        const PAIRS: Eight = [1, 0, 3, 2, 5, 4, 7, 6];
+        const FOURS: Eight = [3, 2, 1, 0, 7, 6, 5, 4];
+        const TWOS: Eight = [2, 3, 0, 1, 6, 7, 4, 5];
+        const EIGHT: Eight = [7, 6, 5, 4, 3, 2, 1, 0];
+        let row = exchange(self, row, PAIRS, 0b1010_1010);
+        let row = exchange(self, row, FOURS, 0b1100_1100);
+        let row = exchange(self, row, PAIRS, 0b1010_1010);
+        let row = exchange(self, row, EIGHT, 0b1111_0000);
+        let row = exchange(self, row, TWOS, 0b1100_1100);
+        exchange(self, row, PAIRS, 0b1010_1010)
+    }
+}
 
-    /// Writes `query` and the places `first + bit` of the set bits of `mask`, any numbers behind them, and returns how many.
-    fn expand(self, query: u32, first: u32, mask: u32, queries: &mut Eight, places: &mut Eight) -> usize;
-
-    /// Returns the first `len` (at most 8) numbers of a row, sorted, and any numbers behind them.
-    fn sorted_short(self, row: &Eight, len: usize) -> Eight;
-
-    /// Returns true if the first `len` (at most 8) numbers of two rows are the same.
-    fn same_short(self, one: &Eight, other: &Eight, len: usize) -> bool;
-
-    /// Returns a bit for each number that is not among the first `len` (at most 8) others.
-    fn absent(self, numbers: &Eight, others: &Eight, len: usize) -> u32;
-
-    /// Returns eight boxes of a list. An invalid one, and one that is not in the list, becomes an empty box: from infinity to minus infinity.
-    fn gather(self, list: &[Aabb], at: &Eight) -> EightBoxes;
-
-    /// Returns the box around eight boxes; an empty one around empty ones.
-    fn around(self, boxes: &EightBoxes) -> Aabb;
-
-    /// Returns the lane of the least of those keys that are at most their limit. Keys are not negative. Of keys that differ in their last
-    /// three bits alone the first one counts as the least.
-    fn nearest(self, keys: &[f32; BLOCK], limits: &[f32; BLOCK]) -> Option<usize>;
-
-    /// Returns those keys that are at most their limit, and their values, the largest key first and that of [`Simd::nearest`] last, any
-    /// others behind them, and their number.
-    fn farthest_first(
-        self,
-        keys: &[f32; BLOCK],
-        limits: &[f32; BLOCK],
-        values: &Eight,
-    ) -> ([f32; BLOCK], Eight, usize);
-
-    /// Returns a bit for each of eight numbers that is at most the other one.
-    fn at_most(self, numbers: &[f32; BLOCK], others: &[f32; BLOCK]) -> u32;
-
-    /// Returns a bit for each of eight boxes that overlaps a box.
-    fn overlaps_eight(self, boxes: &EightBoxes, aabb: &Aabb) -> u32;
+/// Compares each number with a partner's: lanes of `upper` get the greater one, others the lesser one.
+#[inline(always)]
+fn exchange<P: Primitives>(simd: P, row: P::Row, partners: Eight, upper: u32) -> P::Row {
+    let other = simd.permute(row, simd.load(&partners));
+    let mut lanes = [0; BLOCK];
+    (0..BLOCK).for_each(
+        #[inline(always)]
+        |lane| lanes[lane] = (upper >> lane & 1).wrapping_neg(),
+    );
+    simd.select(simd.load(&lanes), simd.max(row, other), simd.min(row, other))
 }
 
 /// Borrows eight numbers of a list, from a place on.
@@ -81,174 +157,17 @@ pub(crate) fn eight_from(list: &mut [u32], from: usize) -> &mut Eight {
     list[from..].first_chunk_mut().expect("lists have room for a block more")
 }
 
-/// Any processor.
-#[derive(Clone, Copy)]
-pub(crate) struct Portable;
-
-impl Portable {
-    /// Calls a function that is inlined here, and not beside the code for other instructions.
-    #[inline(never)]
-    pub(crate) fn run<T>(self, work: impl FnOnce() -> T) -> T {
-        work()
-    }
-}
-
-impl Simd for Portable {
-    #[inline(always)]
-    fn steps(self, origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps) {
-        steps_portable(origin, scale, aabb)
-    }
-
-    #[inline(always)]
-    fn key(self, dims: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32 {
-        let [x, y, z] = std::array::from_fn(|k| {
-            let cell = point[k] >> shift;
-            if wraps { cell & (dims[k] - 1) } else { cell.clamp(1, dims[k] - 2) }
-        });
-        ((z * dims[1] + y) * dims[0] + x) as u32
-    }
-
-    #[inline(always)]
-    fn fits(self, most: &[f32; 3], aabb: &Aabb) -> bool {
-        let fits = |k: usize| {
-            let extent = aabb.max[k] - aabb.min[k];
-            (extent >= 0.0) & (extent <= most[k])
-        };
-        fits(0) & fits(1) & fits(2)
-    }
-
-    #[inline(always)]
-    fn code(self, low: Steps, high: Steps) -> u64 {
-        code_portable(low, high)
-    }
-
-    #[inline(always)]
-    fn test(self, query: u64, codes: &[u64; BLOCK]) -> u32 {
-        let may_overlap = |code: u64| query.wrapping_add(code) & (APART | TOMBSTONE) == 0;
-        (0..BLOCK).fold(0, |mask, bit| mask | u32::from(may_overlap(codes[bit])) << bit)
-    }
-
-    #[inline(always)]
-    fn expand(self, query: u32, first: u32, mask: u32, queries: &mut Eight, places: &mut Eight) -> usize {
-        *queries = [query; BLOCK];
-        let (mut rest, mut count) = (mask, 0);
-        while rest != 0 {
-            places[count] = first + rest.trailing_zeros();
-            rest &= rest - 1;
-            count += 1;
-        }
-        count
-    }
-
-    #[inline(always)]
-    fn sorted_short(self, row: &Eight, len: usize) -> Eight {
-        let mut sorted = *row;
-        sorted[..len].sort_unstable();
-        sorted
-    }
-
-    #[inline(always)]
-    fn same_short(self, one: &Eight, other: &Eight, len: usize) -> bool {
-        one[..len] == other[..len]
-    }
-
-    #[inline(always)]
-    fn absent(self, numbers: &Eight, others: &Eight, len: usize) -> u32 {
-        (0..BLOCK).fold(0, |mask, i| mask | u32::from(!others[..len].contains(&numbers[i])) << i)
-    }
-
-    #[inline(always)]
-    fn gather(self, list: &[Aabb], at: &Eight) -> EightBoxes {
-        let mut boxes = [[0.0; BLOCK]; 6];
-        for lane in 0..BLOCK {
-            let aabb = list.get(at[lane] as usize).unwrap_or(&Aabb::NOWHERE);
-            let is_valid = aabb.is_valid();
-            for k in 0..3 {
-                boxes[k][lane] = if is_valid { aabb.min[k] } else { f32::INFINITY };
-                boxes[k + 3][lane] = if is_valid { aabb.max[k] } else { f32::NEG_INFINITY };
-            }
-        }
-        boxes
-    }
-
-    #[inline(always)]
-    fn around(self, boxes: &EightBoxes) -> Aabb {
-        let mut around = Aabb::NOWHERE;
-        for k in 0..3 {
-            around.min[k] = fold(&boxes[k], |a, b| if a < b { a } else { b });
-            around.max[k] = fold(&boxes[k + 3], |a, b| if a > b { a } else { b });
-        }
-        around
-    }
-
-    #[inline(always)]
-    fn nearest(self, keys: &[f32; BLOCK], limits: &[f32; BLOCK]) -> Option<usize> {
-        let lanes = (0..BLOCK).filter(|lane| keys[*lane] <= limits[*lane]);
-        lanes.min_by_key(|lane| word(keys, *lane))
-    }
-
-    #[inline(always)]
-    fn farthest_first(
-        self,
-        keys: &[f32; BLOCK],
-        limits: &[f32; BLOCK],
-        values: &Eight,
-    ) -> ([f32; BLOCK], Eight, usize) {
-        let (mut order, mut count) = ([0; BLOCK], 0);
-        for lane in (0..BLOCK).filter(|lane| keys[*lane] <= limits[*lane]) {
-            let mut at = count;
-            while at > 0 && word(keys, order[at - 1]) < word(keys, lane) {
-                order[at] = order[at - 1];
-                at -= 1;
-            }
-            (order[at], count) = (lane, count + 1);
-        }
-        (order.map(|lane| keys[lane]), order.map(|lane| values[lane]), count)
-    }
-
-    #[inline(always)]
-    fn at_most(self, numbers: &[f32; BLOCK], others: &[f32; BLOCK]) -> u32 {
-        (0..BLOCK).fold(0, |mask, lane| mask | u32::from(numbers[lane] <= others[lane]) << lane)
-    }
-
-    #[inline(always)]
-    fn overlaps_eight(self, boxes: &EightBoxes, aabb: &Aabb) -> u32 {
-        let mut overlaps = [1; BLOCK];
-        for k in 0..3 {
-            for lane in 0..BLOCK {
-                let meets = (aabb.min[k] <= boxes[k + 3][lane]) & (boxes[k][lane] <= aabb.max[k]);
-                overlaps[lane] &= u32::from(meets);
-            }
-        }
-        (0..BLOCK).fold(0, |mask, lane| mask | overlaps[lane] << lane)
-    }
-}
-
-/// Returns an integer in the order of keys that are not negative. Its last bits are the lane, so that no two are equal.
-#[inline(always)]
-fn word(keys: &[f32; BLOCK], lane: usize) -> u32 {
-    keys[lane].to_bits() & !(BLOCK as u32 - 1) | lane as u32
-}
-
-/// Folds eight numbers in halves: one after the other takes twice as long.
-#[inline(always)]
-fn fold(numbers: &[f32; BLOCK], of: impl Fn(f32, f32) -> f32) -> f32 {
-    let mut four = [0.0; 4];
-    (0..4).for_each(|i| four[i] = of(numbers[i], numbers[i + 4]));
-    of(of(four[0], four[2]), of(four[1], four[3]))
-}
-
-/// Returns the instructions that the CPU backend uses on this machine: "AVX2" or "portable".
+/// Returns the instructions that the CPU backend uses on this machine: "AVX2", "NEON" or "portable".
 ///
 /// ```
-/// assert!(["AVX2", "portable"].contains(&pbig_core::simd()));
+/// assert!(["AVX2", "NEON", "portable"].contains(&pbig_core::simd()));
 /// ```
 pub fn simd() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     if Avx2::detect().is_some() {
         return "AVX2";
     }
-    "portable"
+    if cfg!(target_arch = "aarch64") { "NEON" } else { "portable" }
 }
 
 /// Calls a function with a proof of the best instructions that the processor has, and the arguments. The function and all that it calls
@@ -258,20 +177,32 @@ pub fn simd() -> &'static str {
 macro_rules! dispatch {
     ($work:path, $($argument:expr),*) => {
         match $crate::simd::Avx2::detect() {
-            Some(avx2) => avx2.run(#[inline(always)] || $work(avx2, $($argument),*)),
-            None => $crate::simd::Portable.run(#[inline(always)] || $work($crate::simd::Portable, $($argument),*)),
+            Some(avx2) => $crate::simd::Primitives::run(avx2, #[inline(always)] || $work(avx2, $($argument),*)),
+            None => {
+                let portable = $crate::simd::Portable;
+                $crate::simd::Primitives::run(portable, #[inline(always)] || $work(portable, $($argument),*))
+            }
         }
     };
 }
 
-/// Calls a function with a proof of instructions that every processor has, and the arguments.
+/// Calls a function with a proof of instructions that every processor of the target has, and the arguments.
 #[cfg(not(target_arch = "x86_64"))]
 macro_rules! dispatch {
-    ($work:path, $($argument:expr),*) => {
-        $crate::simd::Portable.run(#[inline(always)] || $work($crate::simd::Portable, $($argument),*))
-    };
+    ($work:path, $($argument:expr),*) => {{
+        let baseline = $crate::simd::BASELINE;
+        $crate::simd::Primitives::run(baseline, #[inline(always)] || $work(baseline, $($argument),*))
+    }};
 }
 pub(crate) use dispatch;
+
+/// The best instructions that every processor of the target has.
+#[cfg(target_arch = "aarch64")]
+pub(crate) const BASELINE: Neon = Neon;
+
+/// The best instructions that every processor of the target has.
+#[cfg(not(any(target_arch = "aarch64", target_arch = "x86_64")))]
+pub(crate) const BASELINE: Portable = Portable;
 
 /// Starts to bring the cache line at `address` into the cache; nothing where the processor has no instruction for it.
 #[inline(always)]
