@@ -1,5 +1,6 @@
 //! The axis-aligned bounding box (AABB), the only geometry that pbig knows.
 
+use crate::simd::one_box;
 use bytemuck::{Pod, Zeroable};
 
 /// A closed axis-aligned box in f32, in the caller's length unit.
@@ -69,82 +70,7 @@ impl Aabb {
     #[inline(always)]
     pub fn overlaps(&self, other: &Self) -> bool {
         // One branch at most, on the result: six branches took three times as long.
-        #[cfg(target_arch = "x86_64")]
-        return self.overlaps_by_lanes(other);
-        #[cfg(not(target_arch = "x86_64"))]
-        return self.overlaps_by_axes(other);
-    }
-
-    /// Returns true if the gaps between this box and one around it are from 0 to `slack` on all sides; none if a gap is NaN, as
-    /// between equal infinities.
-    #[cfg(target_arch = "x86_64")]
-    #[inline(always)]
-    pub(crate) fn gaps_are_within(&self, outer: &Self, slack: f32) -> Option<bool> {
-        use std::arch::x86_64::*;
-        // SAFETY: SSE is part of the architecture.
-        unsafe {
-            // Each coordinate goes into a lane. A box that was just computed and is loaded as a whole waits until it is written.
-            let [min, max] = [self.min, self.max].map(|[x, y, z]| _mm_setr_ps(x, y, z, z));
-            let (outer_min, outer_max) = outer.corners();
-            let (below, above) = (_mm_sub_ps(min, outer_min), _mm_sub_ps(outer_max, max));
-            let (zero, slack) = (_mm_setzero_ps(), _mm_set1_ps(slack));
-            let least = _mm_and_ps(_mm_cmpge_ps(below, zero), _mm_cmpge_ps(above, zero));
-            let most = _mm_and_ps(_mm_cmple_ps(below, slack), _mm_cmple_ps(above, slack));
-            let axes = |lanes| _mm_movemask_ps(lanes) & 7;
-            let is_within = axes(_mm_and_ps(least, most)) == 7;
-            (is_within || axes(_mm_cmpunord_ps(below, above)) == 0).then_some(is_within)
-        }
-    }
-
-    /// Returns true if the gaps between this box and one around it are from 0 to `slack` on all sides; none if a gap is NaN, as
-    /// between equal infinities.
-    #[cfg(not(target_arch = "x86_64"))]
-    #[inline(always)]
-    pub(crate) fn gaps_are_within(&self, outer: &Self, slack: f32) -> Option<bool> {
-        let (mut is_within, mut sum) = (true, 0.0);
-        for k in 0..3 {
-            let (below, above) = (self.min[k] - outer.min[k], outer.max[k] - self.max[k]);
-            is_within &= (below >= 0.0) & (below <= slack) & (above >= 0.0) & (above <= slack);
-            sum += below + above;
-        }
-        (!sum.is_nan()).then_some(is_within)
-    }
-
-    /// Returns both corners, three lanes each; the fourth holds anything.
-    #[cfg(target_arch = "x86_64")]
-    #[inline(always)]
-    pub(crate) fn corners(&self) -> (std::arch::x86_64::__m128, std::arch::x86_64::__m128) {
-        use std::arch::x86_64::{_mm_loadu_ps, _mm_shuffle_ps};
-        // SAFETY: SSE is part of the architecture. A box is six numbers; the loads are of the first four and the last four.
-        unsafe {
-            let first = std::ptr::from_ref(self).cast::<f32>();
-            let max = _mm_loadu_ps(first.add(2));
-            (_mm_loadu_ps(first), _mm_shuffle_ps::<0b00_11_10_01>(max, max))
-        }
-    }
-
-    /// Compares all axes at once with instructions of every x86-64: 11 of them, where one axis after the other takes 30.
-    #[cfg(target_arch = "x86_64")]
-    #[inline(always)]
-    fn overlaps_by_lanes(&self, other: &Self) -> bool {
-        use std::arch::x86_64::{_mm_and_ps, _mm_cmple_ps, _mm_movemask_ps};
-        let ((min, max), (other_min, other_max)) = (self.corners(), other.corners());
-        // SAFETY: SSE is part of the architecture.
-        let axes = unsafe {
-            _mm_movemask_ps(_mm_and_ps(_mm_cmple_ps(min, other_max), _mm_cmple_ps(other_min, max)))
-        };
-        axes & 7 == 7
-    }
-
-    #[cfg(any(test, not(target_arch = "x86_64")))]
-    #[inline(always)]
-    fn overlaps_by_axes(&self, other: &Self) -> bool {
-        (self.min[0] <= other.max[0])
-            & (other.min[0] <= self.max[0])
-            & (self.min[1] <= other.max[1])
-            & (other.min[1] <= self.max[1])
-            & (self.min[2] <= other.max[2])
-            & (other.min[2] <= self.max[2])
+        one_box::overlaps(self, other)
     }
 
     /// Returns the box grown by `margin` on every side, rounded to nearest.
@@ -188,26 +114,6 @@ fn round_down(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[cfg(target_arch = "x86_64")]
-    #[test]
-    fn all_axes_at_once_say_what_one_after_the_other_says() {
-        let numbers =
-            [-1.0, -0.0, 0.0, f32::MIN_POSITIVE / 2.0, 1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
-        let mut seed = 1u64;
-        let mut number = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            numbers[(seed >> 61) as usize]
-        };
-        let mut aabb = || Aabb::new([number(), number(), number()], [number(), number(), number()]);
-        let mut overlaps = 0;
-        for _ in 0..200_000 {
-            let (a, b) = (aabb(), aabb());
-            assert_eq!(a.overlaps_by_lanes(&b), a.overlaps_by_axes(&b), "{a:?} {b:?}");
-            overlaps += u32::from(a.overlaps(&b));
-        }
-        assert!(overlaps > 1000, "{overlaps}");
-    }
 
     #[test]
     fn touching_boxes_overlap_and_a_gap_of_one_ulp_parts_them() {

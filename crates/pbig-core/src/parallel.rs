@@ -169,6 +169,45 @@ pub(crate) fn run_with<T: Send>(own: &mut [T], pieces: usize, work: impl Fn(&mut
     });
 }
 
+/// Runs `work(piece, part)` once for each part of what was split among pieces of work, on at most `workers` threads.
+pub(crate) fn run_parts<P: Send>(
+    workers: usize,
+    parts: impl IntoIterator<Item = P>,
+    work: impl Fn(usize, P) + Sync,
+) {
+    run_parts_with(&mut vec![(); workers], parts, |(), piece, part| work(piece, part));
+}
+
+/// As [`run_parts`], on at most as many threads as there are `own` values: each thread has one of them.
+pub(crate) fn run_parts_with<T: Send, P: Send>(
+    own: &mut [T],
+    parts: impl IntoIterator<Item = P>,
+    work: impl Fn(&mut T, usize, P) + Sync,
+) {
+    let mut parts: Vec<Option<P>> = parts.into_iter().map(Some).collect();
+    let (pieces, shared) = (parts.len(), SharedSlice::new(&mut parts));
+    run_with(own, pieces, |own, piece| {
+        // SAFETY: each piece has a place of its own.
+        if let Some(part) = unsafe { shared.part(piece..piece + 1)[0].take() } {
+            work(own, piece, part);
+        }
+    });
+}
+
+/// Splits a list into parts of these lengths, one behind the other.
+pub(crate) fn split_into<T>(
+    mut list: &mut [T],
+    lens: impl IntoIterator<Item = usize>,
+) -> impl Iterator<Item = &mut [T]> {
+    lens.into_iter().map(move |len| list.split_off_mut(..len).expect("parts lie in the list"))
+}
+
+/// Splits a list into equal pieces.
+pub(crate) fn split_evenly<T>(list: &mut [T], pieces: usize) -> impl Iterator<Item = &mut [T]> {
+    let len = list.len();
+    split_into(list, (0..pieces).map(move |piece| piece_range(len, piece, pieces).len()))
+}
+
 /// Returns `work(piece)` for each `piece < pieces`, in order.
 pub fn map<T: Send>(pieces: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let mut results: Vec<Option<T>> = std::iter::repeat_with(|| None).take(pieces).collect();

@@ -2,7 +2,8 @@
 
 use super::tree::Tree;
 use crate::id_set::IdSet;
-use crate::parallel::{SharedSlice, run, threads_for};
+use crate::parallel::{run_parts, split_into, threads_for};
+use crate::simd::one_box;
 use crate::{Aabb, ProxyFilter};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
@@ -122,19 +123,18 @@ impl World {
         }
         let (is_filtered, pieces) = (self.is_filtered, ids.len().div_ceil(PIECE));
         let mut moved: Vec<Moved> = (0..pieces).map(|_| Moved { is_filtered, ..Moved::default() }).collect();
-        let shared = SharedSlice::new(&mut moved);
-        let (boxes, filters) = (SharedSlice::new(&mut self.boxes), SharedSlice::new(&mut self.filters));
-        let states = SharedSlice::new(&mut self.states);
+        // A part reaches from the first id of a piece to that of the next one.
+        let end = ids.last().map_or(0, |last| *last as usize + 1);
+        let start = |piece: usize| ids.get(piece * PIECE).map_or(end, |id| *id as usize);
+        let lens = || (0..pieces).map(|piece| start(piece + 1) - start(piece));
+        let boxes = split_into(&mut self.boxes[start(0)..], lens());
+        let (filters, states) = (
+            split_into(&mut self.filters[start(0)..], lens()),
+            split_into(&mut self.states[start(0)..], lens()),
+        );
+        let parts = ids.chunks(PIECE).zip(&mut moved).zip(boxes.zip(filters.zip(states)));
         let done = catch_unwind(AssertUnwindSafe(|| {
-            run(threads_for(pieces), pieces, |_, piece| {
-                let ids = &ids[piece * PIECE..ids.len().min((piece + 1) * PIECE)];
-                let range = ids[0] as usize..ids[ids.len() - 1] as usize + 1;
-                // SAFETY: ids ascend, so pieces have different ranges, and the last one is known: it lies in all three lists, which are
-                // equally long. Each piece has its own notes.
-                let (boxes, filters, states, moved) = unsafe {
-                    let moved = &mut shared.part(piece..piece + 1)[0];
-                    (boxes.part(range.clone()), filters.part(range.clone()), states.part(range), moved)
-                };
+            run_parts(threads_for(pieces), parts, |_, ((ids, moved), (boxes, (filters, states)))| {
                 let Moved { changed, valid, is_filtered, is_noted, absent } = moved;
                 let first = ids[0];
                 let mut part =
@@ -291,7 +291,7 @@ impl Part<'_> {
     fn set_aabb(&mut self, id: u32, aabb: Aabb, margin: f32) -> bool {
         let i = self.at(id);
         let Some(fat) = self.boxes.get(i) else { return false };
-        let gaps = aabb.gaps_are_within(fat, slack(margin));
+        let gaps = one_box::gaps_are_within(&aabb, fat, slack(margin));
         let is_held = gaps == Some(true) && aabb.is_valid();
         if !is_held && self.states[i] & state::PRESENT == 0 {
             return false;

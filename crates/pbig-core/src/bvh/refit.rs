@@ -4,7 +4,7 @@ use super::BoxIndex;
 use super::node::{LANES, NONE, Node, extent_sum};
 use super::sort::{Entry, Order, sort};
 use crate::Aabb;
-use crate::parallel::{SharedSlice, available_threads, run};
+use crate::parallel::{available_threads, run_parts};
 use crate::policy::{PARALLEL_FROM_BOXES, bvh as policy};
 use crate::simd::{Simd, dispatch, prefetch};
 use std::sync::atomic::Ordering;
@@ -217,11 +217,8 @@ impl BoxIndex {
     fn read_all(&mut self, boxes: &[Aabb]) {
         let (leaves, end) = (self.leaves as usize, self.end as usize);
         let workers = if boxes.len() < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
-        let (nodes, bounds) = (SharedSlice::new(&mut self.nodes), SharedSlice::new(&mut self.bounds));
-        run(workers, leaves.div_ceil(PIECE), |_, piece| {
-            let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
-            // SAFETY: each number of a piece is given to one thread, pieces have different leaves, and leaves come first in both lists.
-            let (nodes, bounds) = unsafe { (nodes.part(leaves.clone()), bounds.part(leaves)) };
+        let bounds = self.bounds[..leaves].chunks_mut(PIECE);
+        run_parts(workers, self.nodes[..leaves].chunks_mut(PIECE).zip(bounds), |_, (nodes, bounds)| {
             dispatch!(read, nodes, bounds, boxes);
         });
         dispatch!(read, &mut self.nodes[end..], &mut self.bounds[end..], boxes);

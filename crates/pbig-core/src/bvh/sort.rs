@@ -2,7 +2,7 @@
 
 use super::node::LANES;
 use crate::Aabb;
-use crate::parallel::{SharedSlice, available_threads, both, run};
+use crate::parallel::{available_threads, both, run_parts, split_into};
 use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
 
@@ -91,10 +91,7 @@ pub(super) fn sort(entries: &mut [Entry], Order { split, leaf }: Order) -> Vec<R
         first += class.len();
     }
     let workers = if entries.len() < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
-    let shared = SharedSlice::new(entries);
-    run(workers, classes.len(), |_, at| {
-        // SAFETY: classes have different boxes.
-        let class = unsafe { shared.part(classes[at].clone()) };
+    run_parts(workers, split_into(entries, classes.iter().map(Range::len)), |_, class| {
         let may_meet = |sample: &Sampled| sample.entry.may_meet(&class[0], split);
         let samples = samples.iter().copied().filter(may_meet).collect();
         sort_by_place(class, leaf, &Others { samples, is_few: false });

@@ -2,7 +2,7 @@
 
 use super::{Finder, Sets};
 use crate::pairs::Grouping;
-use crate::parallel::{SharedSlice, piece_range, run, threads_for};
+use crate::parallel::{run_parts, threads_for};
 use crate::report::{Clock, stage};
 use crate::search::Receiver;
 use crate::search::Request;
@@ -94,11 +94,9 @@ impl Finder {
     fn name_ids(&mut self) {
         stage!("emit");
         let mut clock = Clock::start();
-        let (len, sets) = (self.pairs_between.len(), &self.sets);
-        let (pairs, pieces) = (SharedSlice::new(&mut self.pairs_between), len.div_ceil(PIECE));
-        run(threads_for(pieces), pieces, |_, piece| {
-            // SAFETY: each piece has its own pairs.
-            let pairs = unsafe { pairs.part(piece_range(len, piece, pieces)) };
+        let sets = &self.sets;
+        let pieces = self.pairs_between.len().div_ceil(PIECE);
+        run_parts(threads_for(pieces), self.pairs_between.chunks_mut(PIECE), |_, pairs| {
             for pair in pairs {
                 let CrossPair { a, b } = sets.named(pair);
                 *pair = Pair { a, b };

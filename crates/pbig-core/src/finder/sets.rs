@@ -1,6 +1,6 @@
 //! The boxes of two sets that may have pairs: without those that miss all of the other set, if these are many.
 
-use crate::parallel::{SharedSlice, ensure_scratch, map, piece_range};
+use crate::parallel::{ensure_scratch, map, piece_range, run_parts, split_evenly, threads_for};
 use crate::policy::{FEW_BOXES, PARALLEL_FROM_BOXES};
 use crate::search::ById;
 use crate::search::grid::bounds::{bounds_of, spread_evenly};
@@ -175,13 +175,12 @@ impl<'a> Side<'a> {
     /// Keeps the valid boxes that overlap a box, of what `fill` puts into each piece. Returns how many are valid.
     fn keep(&mut self, near: &Aabb, fill: impl Fn(&mut [Aabb], &mut [u32], Range<usize>) + Sync) -> u64 {
         let (len, pieces) = (self.len, pieces(self.len));
-        let (boxes, ids) = (SharedSlice::new(self.boxes), SharedSlice::new(self.ids));
-        let kept = map(pieces, |piece| {
-            let range = piece_range(len, piece, pieces);
-            // SAFETY: `len` is at most the length of both lists, and each piece has its own part of it.
-            let (boxes, ids) = unsafe { (boxes.part(range.clone()), ids.part(range.clone())) };
-            fill(boxes, ids, range);
-            keep_in_piece(boxes, ids, near)
+        let mut kept = vec![Kept::NONE; pieces];
+        let boxes = split_evenly(&mut self.boxes[..len], pieces);
+        let parts = boxes.zip(split_evenly(&mut self.ids[..len], pieces)).zip(&mut kept);
+        run_parts(threads_for(pieces), parts, |piece, ((boxes, ids), kept)| {
+            fill(boxes, ids, piece_range(len, piece, pieces));
+            *kept = keep_in_piece(boxes, ids, near);
         });
         self.close_gaps(&kept);
         self.bounds = bounds_of(kept.iter().map(|kept| &kept.bounds));
@@ -204,10 +203,15 @@ impl<'a> Side<'a> {
 }
 
 /// A piece after its boxes have been dropped: the number and bounds of the others, and how many were valid before.
+#[derive(Clone, Copy)]
 struct Kept {
     len: usize,
     valid: u64,
     bounds: Aabb,
+}
+
+impl Kept {
+    const NONE: Self = Self { len: 0, valid: 0, bounds: Aabb::NOWHERE };
 }
 
 /// Returns the number of pieces of some boxes.

@@ -5,7 +5,7 @@ use super::kept::{Kept, Rows};
 use super::row::{self, equal};
 use crate::Pair;
 use crate::memory::ShrinkingVec;
-use crate::parallel::SharedSlice;
+use crate::parallel::split_into;
 use crate::simd::{Simd, dispatch};
 use std::ops::Range;
 
@@ -44,25 +44,27 @@ impl Comparison {
         next.spans.resize(grouping.ids, Span::default());
         next.pool.resize(count, 0);
         self.parts.resize_with(grouping.count, Part::default);
-        let parts = SharedSlice::new(&mut self.parts);
-        let Rows { spans, pool } = &mut *next;
-        let (spans, pool) = (SharedSlice::new(spans), SharedSlice::new(pool));
         let old = &kept.forward;
-        found.for_each(workers, |found, sorter, group| {
-            let (ids, places) = (grouping.ids_of(group), found.range(group));
-            let (first_id, first_place) = (ids.start as u32, places.start as u32);
-            // SAFETY: each group has its own part, ids and places.
-            let (part, spans, pool) =
-                unsafe { (&mut parts.part(group..group + 1)[0], spans.part(ids), pool.part(places)) };
-            part.added.clear();
-            part.removed.clear();
-            found.sort::<false>(group, sorter, spans, pool, first_place);
-            if found.may_repeat {
-                groups::drop_repeated(spans, pool, first_place);
-            }
-            let new = NewRows { names, first_id, first_place, spans, pool };
-            dispatch!(Part::compare, part, old, &new);
-        });
+        let ids = (0..grouping.count).map(|group| grouping.ids_of(group).len());
+        let places = (0..grouping.count).map(|group| found.range(group).len()).collect::<Vec<_>>();
+        let Rows { spans, pool } = &mut *next;
+        let rows = split_into(spans, ids).zip(split_into(pool, places));
+        found.for_each(
+            workers,
+            self.parts.iter_mut().zip(rows),
+            |found, sorter, group, (part, (spans, pool))| {
+                let (first_id, first_place) =
+                    (grouping.ids_of(group).start as u32, found.range(group).start as u32);
+                part.added.clear();
+                part.removed.clear();
+                found.sort::<false>(group, sorter, spans, pool, first_place);
+                if found.may_repeat {
+                    groups::drop_repeated(spans, pool, first_place);
+                }
+                let new = NewRows { names, first_id, first_place, spans, pool };
+                dispatch!(Part::compare, part, old, &new);
+            },
+        );
         kept.next = next;
         self.gather();
         kept.adopt_next(names, &self.added, &self.removed);

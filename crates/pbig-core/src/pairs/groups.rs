@@ -5,7 +5,7 @@ use super::row::{self, SHORT};
 use crate::Pair;
 use crate::id_set::IdSet;
 use crate::memory::ShrinkingVec;
-use crate::parallel::{SharedSlice, ensure_scratch, run, run_with};
+use crate::parallel::{SharedSlice, ensure_scratch, run_parts, run_parts_with, split_into};
 use crate::simd::{Simd, dispatch};
 use std::ops::{Range, RangeInclusive};
 
@@ -83,11 +83,8 @@ impl Groups {
         }
         ensure_scratch(&mut self.pairs, count, Pair::default());
         let pairs = SharedSlice::new(&mut self.pairs);
-        let (len, threads) = (threads.len(), SharedSlice::new(threads));
-        run(workers, len, |_, thread| {
-            // SAFETY: each piece has its own list.
-            let Found { pairs: found, groups: next, .. } =
-                of(unsafe { &mut threads.part(thread..thread + 1)[0] });
+        run_parts(workers, threads, |_, thread| {
+            let Found { pairs: found, groups: next, .. } = of(thread);
             for pair in found.iter() {
                 let place = &mut next[(pair.a >> grouping.shift) as usize];
                 // SAFETY: every pair of every list has its own place.
@@ -140,10 +137,9 @@ impl Groups {
     pub(crate) fn list(&mut self, list: &mut Vec<Pair>, workers: usize) {
         list.clear();
         list.reserve(self.len());
-        let pairs = SharedSlice::new(list.spare_capacity_mut());
-        self.for_each(workers, |groups, sorter, group| {
-            // SAFETY: groups have different pairs.
-            let pairs = unsafe { pairs.part(groups.range(group)) };
+        let lens = (0..self.grouping.count).map(|group| self.range(group).len()).collect::<Vec<_>>();
+        let parts = split_into(list.spare_capacity_mut(), lens);
+        self.for_each(workers, parts, |groups, sorter, group, pairs| {
             let spans = &mut std::mem::take(&mut sorter.spans);
             let others = &mut std::mem::take(&mut sorter.others);
             spans.resize(groups.grouping.ids_of(group).len(), Span::default());
@@ -158,12 +154,19 @@ impl Groups {
         unsafe { list.set_len(self.len()) };
     }
 
-    /// Hands each group to `work`, with the buffers of a thread.
-    pub(super) fn for_each(&mut self, workers: usize, work: impl Fn(&Self, &mut Sorter, usize) + Sync) {
+    /// Hands each group to `work`, with the buffers of a thread and a part of what was split among the groups.
+    pub(super) fn for_each<P: Send>(
+        &mut self,
+        workers: usize,
+        parts: impl IntoIterator<Item = P>,
+        work: impl Fn(&Self, &mut Sorter, usize, P) + Sync,
+    ) {
         let mut sorters = std::mem::take(&mut self.sorters);
         sorters.resize_with(workers.max(sorters.len()), Sorter::default);
         let groups = &*self;
-        run_with(&mut sorters[..workers], groups.grouping.count, |sorter, group| work(groups, sorter, group));
+        run_parts_with(&mut sorters[..workers], parts, |sorter, group, part| {
+            work(groups, sorter, group, part)
+        });
         self.sorters = sorters;
     }
 

@@ -3,7 +3,7 @@
 use super::groups::Span;
 use crate::Pair;
 use crate::memory::{Scratch, ShrinkingVec};
-use crate::parallel::{SharedSlice, alone, available_threads, piece_range, run};
+use crate::parallel::{alone, available_threads, piece_range, run_parts, split_evenly, split_into};
 use crate::policy::PARALLEL_FROM_BOXES;
 use crate::simd::prefetch;
 use std::sync::OnceLock;
@@ -202,16 +202,13 @@ impl Kept {
         let mut pool = ShrinkingVec::default();
         pool.resize(next as usize, 0);
         let pieces = if self.len < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
-        let (ids, starts) = (spans.len(), SharedSlice::new(&mut spans));
-        let all = SharedSlice::new(&mut pool);
-        run(pieces, pieces, |_, piece| {
+        let ids = spans.len();
+        let places =
+            |piece| self.lower[piece_range(ids, piece, pieces)].iter().map(|len| *len as usize).sum();
+        let parts = split_evenly(&mut spans, pieces).zip(split_into(&mut pool, (0..pieces).map(places)));
+        run_parts(pieces, parts, |piece, (spans, pool)| {
             let own = piece_range(ids, piece, pieces);
-            // SAFETY: each piece has its own ids, and their rows follow each other.
-            let spans = unsafe { starts.part(own.clone()) };
             let Some(first) = spans.first().map(|span| span.start as usize) else { return };
-            let places: usize = self.lower[own.clone()].iter().map(|len| *len as usize).sum();
-            // SAFETY: as above.
-            let pool = unsafe { all.part(first..first + places) };
             for pair in self.iter().filter(|pair| own.contains(&(pair.b as usize))) {
                 let span = &mut spans[pair.b as usize - own.start];
                 pool[span.range().end - first] = pair.a;

@@ -1,6 +1,7 @@
 //! A box as the search reads it: half a cache line.
 
 use crate::Aabb;
+use crate::simd::one_box;
 
 /// A box with its id and the key of its cell.
 #[repr(C, align(32))]
@@ -28,16 +29,6 @@ impl Record {
     /// corners can be loaded as four lanes.
     #[inline(always)]
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: SSE is part of the architecture; each load lies inside a record.
-        unsafe {
-            use std::arch::x86_64::{_mm_and_ps, _mm_cmple_ps, _mm_loadu_ps, _mm_movemask_ps};
-            let [a, b] = [self, other].map(|record| std::ptr::from_ref(record).cast::<f32>());
-            let below = _mm_cmple_ps(_mm_loadu_ps(a), _mm_loadu_ps(b.add(3)));
-            let above = _mm_cmple_ps(_mm_loadu_ps(b), _mm_loadu_ps(a.add(3)));
-            _mm_movemask_ps(_mm_and_ps(below, above)) & 7 == 7
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        self.aabb.overlaps(&other.aabb)
+        one_box::records_overlap(bytemuck::cast_ref(self), bytemuck::cast_ref(other))
     }
 }

@@ -6,7 +6,7 @@
 //! the last axis overlaps, without a test.
 
 use super::hits::{Hits, Rule};
-use crate::parallel::{SharedSlice, run_with};
+use crate::parallel::run_parts_with;
 use crate::policy::PARALLEL_FROM_BOXES;
 use crate::{Aabb, Pair};
 
@@ -78,11 +78,8 @@ fn stream(intervals: &[Corners], points: &[Corners], rule: &Rule<'_>, hits: &mut
     let mut points = points.to_vec();
     points.sort_unstable_by_key(|point| point.point(2));
     let parts = if points.len() < PARALLEL_FROM_BOXES { 1 } else { PARTS };
-    let (len, size) = (points.len(), points.len().div_ceil(parts).max(1));
-    let points = SharedSlice::new(&mut points);
-    run_with(hits, len.div_ceil(size), |hits, part| {
-        // SAFETY: each part has its own points.
-        let points = unsafe { points.part(part * size..len.min((part + 1) * size)) };
+    let size = points.len().div_ceil(parts).max(1);
+    run_parts_with(hits, points.chunks_mut(size), |hits, _, points| {
         let mut stream = Stream { rule, from: hits.found.pairs.len(), hits };
         stream.find(intervals, points, 2);
         stream.keep();

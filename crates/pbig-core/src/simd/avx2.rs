@@ -1,6 +1,7 @@
 //! Primitives of AVX2, which all x86-64 processors of the last ten years have.
 
 use super::codes::{MAX_STEP, MIN_STEP, Steps};
+use super::sse::corners;
 use super::{BLOCK, Eight, Primitives};
 use crate::Aabb;
 use std::arch::x86_64::*;
@@ -183,7 +184,7 @@ impl Primitives for Avx2 {
     fn steps(self, origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps) {
         // SAFETY: `self` proves the instructions; each load is of an array of four.
         unsafe {
-            let (min, max) = aabb.corners();
+            let (min, max) = corners(aabb);
             let origin = _mm256_loadu_pd(origin.as_ptr());
             let scale = _mm256_loadu_pd(scale.as_ptr());
             let steps = |corner: __m128| -> Steps {
@@ -218,7 +219,7 @@ impl Primitives for Avx2 {
     fn fits(self, &[x, y, z]: &[f32; 3], aabb: &Aabb) -> bool {
         // SAFETY: `self` proves the instructions.
         unsafe {
-            let (min, max) = aabb.corners();
+            let (min, max) = corners(aabb);
             let extent = _mm_sub_ps(max, min);
             let fits = _mm_cmple_ps(extent, _mm_setr_ps(x, y, z, 0.0));
             _mm_movemask_ps(_mm_and_ps(_mm_cmpge_ps(extent, _mm_setzero_ps()), fits)) & 7 == 7
@@ -255,7 +256,7 @@ impl Primitives for Avx2 {
 /// The processor has AVX2.
 #[inline(always)]
 unsafe fn pair(one: &Aabb, other: &Aabb) -> (__m256, __m256) {
-    let ((min, max), (other_min, other_max)) = (one.corners(), other.corners());
+    let ((min, max), (other_min, other_max)) = (corners(one), corners(other));
     // SAFETY: the caller's promise.
     unsafe { (_mm256_set_m128(other_min, min), _mm256_set_m128(other_max, max)) }
 }

@@ -4,19 +4,28 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(any(test, not(target_arch = "x86_64")))]
+pub(crate) mod axes;
 mod codes;
 mod kernels;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod portable;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod sse;
 
+#[cfg(target_arch = "x86_64")]
+pub(crate) use self::sse as one_box;
 use crate::Aabb;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
+#[cfg(not(target_arch = "x86_64"))]
+pub(crate) use axes as one_box;
 pub(crate) use codes::{Steps, TOMBSTONE, query_of};
 pub(crate) use kernels::Simd;
 #[cfg(target_arch = "aarch64")]
 use neon::Neon;
+pub(crate) use one_box::prefetch;
 pub(crate) use portable::Portable;
 
 /// Codes tested together: a cache line of them.
@@ -27,6 +36,9 @@ pub(crate) type EightBoxes = [[f32; BLOCK]; 6];
 
 /// Eight ids or places.
 pub(crate) type Eight = [u32; BLOCK];
+
+/// Least and greatest coordinates of some boxes, and greatest extents. Each has an axis a lane; the fourth lane holds anything.
+pub(crate) type Extremes = [[f32; 4]; 3];
 
 /// Instructions of a processor. A value is a proof that the processor has them.
 pub(crate) trait Primitives: Copy {
@@ -203,16 +215,3 @@ pub(crate) const BASELINE: Neon = Neon;
 /// The best instructions that every processor of the target has.
 #[cfg(not(any(target_arch = "aarch64", target_arch = "x86_64")))]
 pub(crate) const BASELINE: Portable = Portable;
-
-/// Starts to bring the cache line at `address` into the cache; nothing where the processor has no instruction for it.
-#[inline(always)]
-pub(crate) fn prefetch<T>(address: *const T) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: a prefetch reads nothing that could fault.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = address;
-}

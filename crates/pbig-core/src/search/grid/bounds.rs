@@ -1,7 +1,8 @@
 //! Bounds and sizes of a set of boxes, from which the plan of a grid follows.
 
 use crate::Aabb;
-use crate::parallel::{SharedSlice, piece_range, run};
+use crate::parallel::{map, piece_range};
+use crate::simd::one_box;
 
 /// Maximum coordinate. Larger ones count as this one, so that a width never overflows.
 const FARTHEST: f32 = 1e37;
@@ -35,23 +36,24 @@ impl Bounds {
 
     /// Measures all boxes.
     fn of(boxes: &[Aabb], workers: usize) -> Self {
-        let pieces = workers.max(1);
-        let mut parts = [Self::NONE; 64];
-        let shared = SharedSlice::new(&mut parts);
-        let pieces = pieces.min(64);
-        run(workers, pieces, |_, piece| {
-            let part = measure(Self::NONE, &boxes[piece_range(boxes.len(), piece, pieces)]);
-            // SAFETY: each piece writes its own part.
-            unsafe { shared.write(piece, part) }
-        });
-        parts[..pieces].iter().fold(Self::NONE, |all, part| all.merged(part)).limited()
+        if workers <= 1 {
+            return Self::NONE.widened(boxes).limited();
+        }
+        let part = |piece| Self::NONE.widened(&boxes[piece_range(boxes.len(), piece, workers)]);
+        map(workers, part).into_iter().fold(Self::NONE, |all, part| all.merged(&part)).limited()
+    }
+
+    /// Returns the bounds of some boxes and of these.
+    fn widened<'a>(self, boxes: impl IntoIterator<Item = &'a Aabb>) -> Self {
+        let [low, high, extent] = one_box::widened([self.low, self.high, self.extent], boxes);
+        Self { low, high, extent }
     }
 
     fn merged(self, other: &Self) -> Self {
         Self {
-            low: std::array::from_fn(|k| lesser(other.low[k], self.low[k])),
-            high: std::array::from_fn(|k| greater(other.high[k], self.high[k])),
-            extent: std::array::from_fn(|k| greater(other.extent[k], self.extent[k])),
+            low: std::array::from_fn(|k| other.low[k].min(self.low[k])),
+            high: std::array::from_fn(|k| other.high[k].max(self.high[k])),
+            extent: std::array::from_fn(|k| other.extent[k].max(self.extent[k])),
         }
     }
 
@@ -88,54 +90,13 @@ impl Bounds {
 
 /// Returns a box around boxes that are valid or [`Aabb::NOWHERE`], which it is without a valid one.
 pub(crate) fn bounds_of<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Aabb {
-    let Bounds { low: [x, y, z, _], high: [right, top, back, _], .. } = measure(Bounds::EMPTY, boxes);
+    let Bounds { low: [x, y, z, _], high: [right, top, back, _], .. } = Bounds::EMPTY.widened(boxes);
     let bounds = Aabb::new([x, y, z], [right, top, back]);
     if bounds.is_valid() { bounds } else { Aabb::NOWHERE }
 }
 
-/// The lesser of two; the second one where the first is NaN.
-#[inline(always)]
-fn lesser(x: f32, y: f32) -> f32 {
-    if x < y { x } else { y }
-}
-
-/// The greater of two; the second one where the first is NaN.
-#[inline(always)]
-fn greater(x: f32, y: f32) -> f32 {
-    if x > y { x } else { y }
-}
-
 fn largest(extent: &[f32]) -> f32 {
     extent[0].max(extent[1]).max(extent[2])
-}
-
-/// Widens bounds to some boxes, three axes at once: every x86-64 has the instructions.
-#[cfg(target_arch = "x86_64")]
-fn measure<'a>(mut all: Bounds, boxes: impl IntoIterator<Item = &'a Aabb>) -> Bounds {
-    use std::arch::x86_64::*;
-    let lanes = |of: [f32; 4]| bytemuck::cast::<_, __m128>(of);
-    let (mut low, mut high, mut extent) = (lanes(all.low), lanes(all.high), lanes(all.extent));
-    for (min, max) in boxes.into_iter().map(Aabb::corners) {
-        // SAFETY: SSE is part of the architecture. The second operand wins where the first is NaN.
-        (low, high, extent) = unsafe {
-            (_mm_min_ps(min, low), _mm_max_ps(max, high), _mm_max_ps(_mm_sub_ps(max, min), extent))
-        };
-    }
-    [all.low, all.high, all.extent] = [low, high, extent].map(bytemuck::cast);
-    all
-}
-
-/// Widens bounds to some boxes.
-#[cfg(not(target_arch = "x86_64"))]
-fn measure<'a>(mut all: Bounds, boxes: impl IntoIterator<Item = &'a Aabb>) -> Bounds {
-    for aabb in boxes {
-        for k in 0..3 {
-            all.low[k] = lesser(aabb.min[k], all.low[k]);
-            all.high[k] = greater(aabb.max[k], all.high[k]);
-            all.extent[k] = greater(aabb.max[k] - aabb.min[k], all.extent[k]);
-        }
-    }
-    all
 }
 
 /// A few valid boxes, spread evenly over two lists.
@@ -223,16 +184,9 @@ pub fn size_classes(boxes: &[Aabb], workers: usize) -> SizeClasses {
     if workers <= 1 {
         return classes_of(boxes);
     }
-    let pieces = workers.min(16);
-    let mut parts = [NO_CLASSES; 16];
-    let shared = SharedSlice::new(&mut parts);
-    run(workers, pieces, |_, piece| {
-        let part = classes_of(&boxes[piece_range(boxes.len(), piece, pieces)]);
-        // SAFETY: each piece writes its own part.
-        unsafe { shared.write(piece, part) }
-    });
-    let mut all = parts[0];
-    for part in &parts[1..pieces] {
+    let parts = map(workers, |piece| classes_of(&boxes[piece_range(boxes.len(), piece, workers)]));
+    let mut all = NO_CLASSES;
+    for part in &parts {
         all.iter_mut().zip(part).for_each(|(all, part)| all.add(part));
     }
     all

@@ -8,11 +8,10 @@ use super::cells::Cells;
 use super::scan::Sorted;
 use super::spacing::GridPlan;
 use crate::Aabb;
-use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run};
+use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run_parts, split_evenly, split_into};
 use crate::search::record::Record;
 use crate::simd::TOMBSTONE;
 use crate::simd::{BLOCK, Simd, dispatch};
-use std::ops::Range;
 
 /// Maximum number of buckets of the first sort: their write positions stay in the nearest cache.
 const MAX_BUCKETS: usize = 2047;
@@ -86,12 +85,10 @@ impl Grid {
         self.counts.resize(pieces, BucketCounts::ZERO);
         // In the memory of the codes, which are computed when the keys are no longer needed.
         let keys: &mut [u32] = bytemuck::cast_slice_mut(&mut self.codes);
-        let (keys, counts) = (SharedSlice::new(keys), SharedSlice::new(&mut self.counts));
-        let plan = &self.plan;
-        run(workers, split.pieces, |_, piece| {
+        let (keys, plan) = (&mut keys[..boxes.len()], &self.plan);
+        let parts = split_evenly(keys, split.pieces).zip(&mut self.counts[..]);
+        run_parts(workers, parts, |piece, (keys, counts)| {
             let range = piece_range(boxes.len(), piece, split.pieces);
-            // SAFETY: each piece has its own boxes and counts.
-            let (keys, counts) = unsafe { (keys.part(range.clone()), &mut counts.part(piece..piece + 1)[0]) };
             counts.0[..=split.buckets].fill(0);
             (counts.0[BucketCounts::OVERSIZE], counts.0[BucketCounts::INVALID]) = (0, 0);
             dispatch!(count_keys, plan.cells, &boxes[range.clone()], keys, counts, split.shift);
@@ -127,11 +124,9 @@ impl Grid {
 
     /// Brings records into their buckets.
     fn scatter(&mut self, (boxes, first_id): (&[Aabb], u32), split: Split, workers: usize) {
-        let (coarse, counts) = (SharedSlice::new(&mut self.coarse), SharedSlice::new(&mut self.counts));
+        let coarse = SharedSlice::new(&mut self.coarse);
         let keys: &[u32] = bytemuck::cast_slice(&self.codes);
-        run(workers, split.pieces, |_, piece| {
-            // SAFETY: each piece has its own counts.
-            let next = unsafe { &mut counts.part(piece..piece + 1)[0].0 };
+        run_parts(workers, &mut self.counts[..split.pieces], |piece, BucketCounts(next)| {
             let range = piece_range(boxes.len(), piece, split.pieces);
             let first_id = first_id + range.start as u32;
             let (boxes, keys) = (&boxes[range.clone()], &keys[range]);
@@ -142,17 +137,17 @@ impl Grid {
     /// Sorts each bucket by cell, and computes codes.
     fn sort_buckets(&mut self, split: Split, workers: usize) {
         let (cells, bucket_starts) = (self.plan.cells.count(), &self.bucket_starts);
-        let sort = SortBuckets {
-            plan: self.plan,
-            coarse: &self.coarse,
-            records: SharedSlice::new(&mut self.records),
-            codes: SharedSlice::new(&mut self.codes),
-            ends: SharedSlice::new(&mut self.starts[1..]),
-        };
-        run(workers, split.buckets, |_, bucket| {
-            let slots = bucket_starts[bucket] as usize..bucket_starts[bucket + 1] as usize;
-            let keys = bucket << split.shift..((bucket + 1) << split.shift).min(cells);
-            dispatch!(sort_bucket, &sort, slots.clone(), keys.clone());
+        let (coarse, plan) = (&self.coarse, &self.plan);
+        let slots = |bucket: usize| bucket_starts[bucket] as usize..bucket_starts[bucket + 1] as usize;
+        let keys = |bucket: usize| bucket << split.shift..((bucket + 1) << split.shift).min(cells);
+        let slot_counts = || (0..split.buckets).map(|bucket| slots(bucket).len());
+        let records =
+            split_into(&mut self.records, slot_counts()).zip(split_into(&mut self.codes, slot_counts()));
+        let ends = split_into(&mut self.starts[1..], (0..split.buckets).map(|bucket| keys(bucket).len()));
+        run_parts(workers, records.zip(ends), |bucket, ((records, codes), ends)| {
+            let (slots, first_key) = (slots(bucket), keys(bucket).start);
+            let sorted = SortedBucket { first_key, first_slot: slots.start, ends, records, codes };
+            dispatch!(sort_bucket, plan.cells, &coarse[slots.clone()], sorted);
         });
         self.starts[0] = 0;
         self.starts[cells + 1..cells + 4].fill(self.len as u32);
@@ -234,36 +229,32 @@ fn scatter_records(
     }
 }
 
-struct SortBuckets<'a> {
-    plan: GridPlan,
-    coarse: &'a [Record],
-    records: SharedSlice<'a, Record>,
-    codes: SharedSlice<'a, u64>,
+/// The slots and cells of a bucket.
+struct SortedBucket<'a> {
+    first_key: usize,
+    first_slot: usize,
     /// By cell: where it ends.
-    ends: SharedSlice<'a, u32>,
+    ends: &'a mut [u32],
+    records: &'a mut [Record],
+    codes: &'a mut [u64],
 }
 
 /// Sorts a bucket by cell, and computes its codes.
 #[inline(always)]
-fn sort_bucket(simd: impl Simd, sort: &SortBuckets<'_>, slots: Range<usize>, keys: Range<usize>) {
-    let cells = sort.plan.cells;
-    // SAFETY: no other bucket has these cells or slots.
-    let (ends, records, codes) = unsafe {
-        (sort.ends.part(keys.clone()), sort.records.part(slots.clone()), sort.codes.part(slots.clone()))
-    };
-    let bucket = &sort.coarse[slots.clone()];
+fn sort_bucket(simd: impl Simd, cells: Cells, bucket: &[Record], sorted: SortedBucket<'_>) {
+    let SortedBucket { first_key, first_slot, ends, records, codes } = sorted;
     ends.fill(0);
     for record in bucket {
-        ends[record.key as usize - keys.start] += 1;
+        ends[record.key as usize - first_key] += 1;
     }
-    let mut next = slots.start as u32;
+    let mut next = first_slot as u32;
     for end in ends.iter_mut() {
         next += std::mem::replace(end, next);
     }
     for record in bucket {
-        let place = &mut ends[record.key as usize - keys.start];
+        let place = &mut ends[record.key as usize - first_key];
         let (low, high) = cells.steps(simd, &record.aabb);
-        let (slot, code) = (*place as usize - slots.start, simd.code(low, high));
+        let (slot, code) = (*place as usize - first_slot, simd.code(low, high));
         (records[slot], codes[slot]) = (*record, code);
         *place += 1;
     }

@@ -59,15 +59,4 @@ impl Grid {
         self.codes.settle(room + 2 * BLOCK);
         self.starts.settle(cells);
     }
-
-    /// Returns the codes of eight slots.
-    ///
-    /// # Safety
-    /// `first` is at most the number of slots in use: two blocks of tombstones are behind these.
-    #[inline(always)]
-    unsafe fn block(&self, first: usize) -> &[u64; BLOCK] {
-        debug_assert!(first <= self.len);
-        // SAFETY: the caller's promise.
-        unsafe { &*self.codes.as_ptr().add(first).cast() }
-    }
 }

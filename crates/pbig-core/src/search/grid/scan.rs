@@ -97,6 +97,19 @@ impl<'a> Sorted<'a> {
     }
 }
 
+impl Grid {
+    /// Returns the codes of eight slots.
+    ///
+    /// # Safety
+    /// `first` is at most the number of slots in use: two blocks of tombstones are behind these.
+    #[inline(always)]
+    unsafe fn block(&self, first: usize) -> &[u64; BLOCK] {
+        debug_assert!(first <= self.len);
+        // SAFETY: the caller's promise.
+        unsafe { &*self.codes.as_ptr().add(first).cast() }
+    }
+}
+
 #[inline(always)]
 fn search_piece(simd: impl Simd, sorted: &Sorted<'_>, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
     let mut blocks = [0; HIT_ROOM];
