@@ -163,6 +163,7 @@ impl<'a, T> SharedSlice<'a, T> {
 /// has one of them.
 pub(crate) fn run_with<T: Send>(own: &mut [T], pieces: usize, work: impl Fn(&mut T, usize) + Sync) {
     let (threads, shared) = (own.len(), SharedSlice::new(own));
+    assert!(threads > 0 || pieces == 0, "each thread has a value, and one works at least");
     run(threads, pieces, |worker, piece| {
         // SAFETY: a worker has one piece at a time, and there are as many values as workers.
         work(unsafe { &mut shared.part(worker..worker + 1)[0] }, piece);
