@@ -8,6 +8,7 @@
 #   viewer                 builds, lints and tests the viewer
 #   pictures               makes docs/images again from a fixed seed, with the times of this machine
 #   avian                  lints and tests the plug-ins for avian; builds bevy, from clean ten minutes
+#   python                 installs the package for Python in a new environment, and tests it; from clean three minutes
 #   sanitize KIND          pbig-core's unit tests with a sanitizer, `address` or `thread`
 #   fuzz [SECONDS] [TARGET...]     each target for 600 seconds; needs nightly Rust and cargo-fuzz
 set -euo pipefail
@@ -176,6 +177,25 @@ run_avian() {
     step cargo clippy --locked --release $avian --all-targets -- -D warnings
 }
 
+# The candidates of a mesh are compared with those of ipctk, if it can be installed, and of the program `pbig`, if it has been built.
+run_python() {
+    local work python
+    work=$(mktemp -d)
+    trap "rm -rf '$work'" EXIT
+    python3 -m venv "$work/venv" || { left_out "the package for Python" "it needs python3 with venv" && return; }
+    export CARGO_TARGET_DIR PBIG_PROGRAM PYO3_PYTHON=$work/venv/bin/python
+    CARGO_TARGET_DIR=$(target_folder)
+    PBIG_PROGRAM=$CARGO_TARGET_DIR/release/pbig
+    [ -x "$PBIG_PROGRAM" ] || unset PBIG_PROGRAM
+    python=$PYO3_PYTHON
+    step cargo fmt --manifest-path python/Cargo.toml --check
+    step cargo clippy --locked --release --manifest-path python/Cargo.toml -- -D warnings
+    step "$python" -m pip install --quiet ./python mypy pytest
+    step "$python" -m pip install --quiet --only-binary :all: ipctk || echo "== left out: ipctk, which has no wheel for this Python"
+    step "$python" -m mypy --strict python/package
+    step "$python" -m pytest -q -r s -p no:cacheprovider python/tests
+}
+
 # pack PICTURE FROM: writes a PNG file of 256 colours, and fails if it is large.
 pack() {
     pngquant --force --speed 1 --output "$1" 256 "$2"
@@ -262,7 +282,7 @@ case $name in
 wasm | aarch64) parts="rust $name" ;;
 viewer | pictures) parts="rust vulkan $name" ;;
 publish) parts="rust deny msrv semver" ;;
-features | avian | sanitize | fuzz) parts=rust ;;
+features | avian | python | sanitize | fuzz) parts=rust ;;
 *) sed -n '2,/^set/s/^# \{0,1\}//p' "$0" >&2 && exit 2 ;;
 esac
 shift

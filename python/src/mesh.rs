@@ -1,0 +1,106 @@
+//! The vertices, edges and faces of a mesh, their boxes, and pairs of these that share no vertex.
+
+use pbig_core::{Aabb, Boxes, Error, Finder, Keys, NO_KEY};
+
+/// Two kinds of elements: `v` for vertices, `e` for edges or `f` for faces.
+pub(crate) type KindPair = [char; 2];
+
+/// Pairs of indices.
+type Pairs = Vec<[u32; 2]>;
+
+/// Returns the edges of faces, each once: larger and then smaller vertex, sorted. The program `pbig` has the same rule.
+pub(crate) fn edges(faces: &[Keys]) -> Pairs {
+    let sides = faces.iter().flat_map(|face| {
+        let corners = face.iter().filter(|vertex| **vertex != NO_KEY).count();
+        (0..corners).map(move |k| [face[k], face[(k + 1) % corners]])
+    });
+    let ordered = sides.map(|[v, w]| [v.max(w), v.min(w)]);
+    let mut edges: Pairs = ordered.filter(|[v, w]| v != w).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
+/// The boxes of the vertices, and the faces: three vertices and `NO_KEY`, or four vertices.
+pub(crate) struct Mesh<'a> {
+    vertices: Vec<Aabb>,
+    faces: &'a [Keys],
+}
+
+impl<'a> Mesh<'a> {
+    pub(crate) fn new([from, to]: [&[[f64; 3]]; 2], faces: &'a [Keys], margin: f64) -> Self {
+        let vertices = from.iter().zip(to).map(|(from, to)| swept(from, to, margin)).collect();
+        Self { vertices, faces }
+    }
+
+    /// Returns a list of pairs for each two kinds.
+    pub(crate) fn find(&self, all: &[KindPair]) -> Result<Vec<Pairs>, Error> {
+        let is_wanted = |kind| all.iter().any(|kinds| kinds.contains(&kind));
+        let wanted = |kind| if is_wanted(kind) { self.elements(kind) } else { Elements::default() };
+        let [v, e, f] = ['v', 'e', 'f'].map(wanted);
+        let of = |kind| match kind {
+            'v' => &v,
+            'e' => &e,
+            _ => &f,
+        };
+        all.iter().map(|[a, b]| if a == b { of(*a).pairs() } else { of(*a).pairs_with(of(*b)) }).collect()
+    }
+
+    fn elements(&self, kind: char) -> Elements {
+        let keys: Vec<Keys> = match kind {
+            'v' => (0..self.vertices.len() as u32).map(|v| [v, NO_KEY, NO_KEY, NO_KEY]).collect(),
+            'e' => edges(self.faces).into_iter().map(|[v, w]| [v, w, NO_KEY, NO_KEY]).collect(),
+            _ => self.faces.to_vec(),
+        };
+        Elements { boxes: keys.iter().map(|keys| self.around(keys)).collect(), keys }
+    }
+
+    /// Returns the box around some vertices; invalid if one of theirs is.
+    fn around(&self, keys: &Keys) -> Aabb {
+        let corners = keys.iter().filter(|key| **key != NO_KEY).map(|key| self.vertices[*key as usize]);
+        let both = |a: Aabb, b: Aabb| if a.is_valid() && b.is_valid() { a.union(&b) } else { Aabb::NOWHERE };
+        corners.reduce(both).unwrap_or(Aabb::NOWHERE)
+    }
+}
+
+/// Returns the box of a point on its straight way, grown by a margin and rounded outward. A NaN makes it invalid.
+fn swept(from: &[f64; 3], to: &[f64; 3], margin: f64) -> Aabb {
+    if from.iter().chain(to).any(|x| x.is_nan()) {
+        return Aabb::NOWHERE;
+    }
+    let min = std::array::from_fn(|k| lowered(from[k].min(to[k]), margin));
+    let max = std::array::from_fn(|k| -lowered((-from[k]).min(-to[k]), margin));
+    Aabb::from_f64(min, max)
+}
+
+/// Returns `x - margin`, rounded downward.
+fn lowered(x: f64, margin: f64) -> f64 {
+    let nearest = x - margin;
+    // The rounding error, exactly (Knuth's TwoSum). With infinities it is a NaN.
+    let subtracted = x - nearest;
+    let error = (x - (nearest + subtracted)) + (subtracted - margin);
+    if error < 0.0 { nearest.next_down() } else { nearest }
+}
+
+/// Boxes of elements of one kind, and the vertices of each.
+#[derive(Default)]
+struct Elements {
+    boxes: Vec<Aabb>,
+    keys: Vec<Keys>,
+}
+
+impl Elements {
+    fn apart(&self) -> Boxes<'_> {
+        Boxes::new(&self.boxes).with_keys(&self.keys)
+    }
+
+    fn pairs(&self) -> Result<Pairs, Error> {
+        let mut finder = Finder::default();
+        Ok(bytemuck::cast_slice(finder.find_without_shared(&self.boxes, &self.keys)?).to_vec())
+    }
+
+    fn pairs_with(&self, other: &Self) -> Result<Pairs, Error> {
+        let mut finder = Finder::default();
+        Ok(bytemuck::cast_slice(finder.find_between(self.apart(), other.apart())?).to_vec())
+    }
+}
