@@ -107,11 +107,17 @@ def test_touching_boxes_overlap_and_the_smallest_gap_parts_them():
 
 
 def test_float64_is_rounded_outward():
-    gap = np.array([[0, 0, 0, 0.1, 1, 1], [np.nextafter(0.1, 1), 0, 0, 1, 1, 1]])
-    assert pbig.pairs(gap).tolist() == [[0, 1]]
-    # A box that is inverted in float64 stays invalid where rounding would mend it.
-    gap[1, :3] = gap[1, 3:] + 1e-12
-    assert pbig.pairs(gap).tolist() == []
+    # float32 has no number between 1 and 1 + bit. The nearest ones to these ends are 1 and 1 + bit.
+    bit = 2.0**-23
+    boxes = np.array([[0, 0, 0, 1 + 0.4 * bit, 1, 1], [1 + 0.6 * bit, 0, 0, 2, 1, 1]])
+    assert pbig.pairs(boxes).tolist() == pbig.pairs(-boxes[:, [3, 4, 5, 0, 1, 2]]).tolist() == [[0, 1]]
+    assert pbig.pairs(boxes.astype(np.float32)).tolist() == []
+
+
+def test_a_box_that_is_inverted_in_float64_alone_has_no_pairs():
+    boxes = np.array([[0, 0, 0, 2, 2, 2], [1 + 1e-12, 1, 1, 1, 1, 1]])
+    assert pbig.pairs(boxes).tolist() == []
+    assert pbig.pairs(boxes.astype(np.float32)).tolist() == [[0, 1]]
 
 
 def test_float32_is_read_in_place():

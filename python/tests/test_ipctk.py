@@ -17,11 +17,13 @@ def moving_cloth(side):
     return before, before + random.normal(size=vertices.shape) * 0.3, faces
 
 
-def sphere(side):
-    """Returns a closed surface, moved and turned."""
+def ball(side):
+    """Returns an uneven ball without poles, moved and turned."""
     longitude, latitude = np.meshgrid(np.arange(side) * 2 * np.pi / side, np.linspace(0.1, np.pi - 0.1, side))
     x, y, z = np.cos(longitude) * np.sin(latitude), np.sin(longitude) * np.sin(latitude), np.cos(latitude)
     before = np.stack([x, y, 0.1 * z], axis=-1).reshape(-1, 3)
+    # Otherwise many boxes differ by less than float32 can tell.
+    before += np.random.default_rng(side).normal(size=before.shape) * 0.01
     corner = np.array([[row * side + k, row * side + (k + 1) % side] for row in range(side - 1) for k in range(side)])
     faces = np.vstack([np.hstack([corner, corner[:, :1] + side]), np.hstack([corner[:, 1:], corner + side])])
     return before, before[:, [1, 2, 0]] + 0.1, faces
@@ -40,7 +42,7 @@ def candidates_of_pbig(before, after, faces, margin):
     return {kinds: {tuple(pair) for pair in pairs.tolist()} for kinds, pairs in found.items()}
 
 
-SCENES = [scene for side in (6, 15) for scene in (moving_cloth(side), sphere(side))]
+SCENES = [scene for side in (6, 15) for scene in (moving_cloth(side), ball(side))]
 
 
 @pytest.mark.parametrize("margin", [0.0, 1e-3, 0.1])
@@ -50,8 +52,8 @@ def test_candidates_contain_those_of_ipctk(scene, margin):
     for kinds in ("ee", "vf"):
         assert len(theirs[kinds]) > 50
         assert theirs[kinds] <= ours[kinds]
-        # Rounding to float32 adds few.
-        assert len(ours[kinds]) <= 1.02 * len(theirs[kinds])
+        # Rounding to float32 adds next to none.
+        assert len(ours[kinds]) <= 1.001 * len(theirs[kinds])
 
 
 @pytest.mark.parametrize("scene", SCENES)

@@ -49,6 +49,15 @@ def test_candidates_are_those_of_a_test_of_all(mesh, moves, margin):
         assert pairs.tolist() == brute.mesh_pairs(kinds, frames, faces.tolist(), margin), kinds
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_margin_below_the_last_bit_grows_boxes(sign):
+    places = np.array([1, np.nextafter(np.float32(1), np.float32(2))], float) * sign
+    vertices = np.stack([places, places * 0, places * 0], axis=-1)
+    for margin, pairs in [(0.0, []), (1e-30, [[0, 1]])]:
+        found = pbig.mesh_pairs(vertices, np.zeros((0, 3), int), margin=margin, elements="vv")["vv"].tolist()
+        assert found == brute.mesh_pairs("vv", [vertices], [], margin) == pairs
+
+
 def test_meshes_have_candidates_and_other_elements():
     for mesh in ("soup", "quadrilaterals", "cloth"):
         vertices, faces = MESHES[mesh]
