@@ -32,7 +32,7 @@ def random_box(random):
 
 
 class Model:
-    """What a broad phase should do, by testing all."""
+    """A broad phase that tests all pairs."""
 
     def __init__(self):
         self.boxes, self.pairs = {}, set()

@@ -1,4 +1,4 @@
-"""Arguments of callers as arrays that the compiled module reads. What is wrong is said with its place and a remedy."""
+"""Arguments of callers as arrays that the compiled module reads. Errors name the argument, the place and a remedy."""
 
 from __future__ import annotations
 
