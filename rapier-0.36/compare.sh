@@ -150,7 +150,7 @@ default_tests() {
     done
 }
 
-# The tests that fail with pbig, each explained in docs/RAPIER_VERSIONS.md.
+# The tests that fail with pbig, each explained in docs/DROP_IN.md.
 expected="awake_pile capsule_on_trimesh_falls_asleep ccd_bodies \
 geometry::narrow_phase::test::collider_set_parent_no_self_intersection joints_and_sensor \
 multibody_articulation restoring_into_a_live_pipeline sleeping_pile structural_changes"

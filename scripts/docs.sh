@@ -66,11 +66,10 @@ at_most() {
 }
 
 check_lengths() {
-    at_most 120 "$(awk 'END { print NR }' README.md)" "lines of README.md"
-    at_most 1500 "$(words docs/ACCURACY.md)" "words of docs/ACCURACY.md"
-    at_most 4000 "$(words docs/ARCHITECTURE.md)" "words of docs/ARCHITECTURE.md"
-    at_most 16900 "$(words $documents)" "words of all documents"
-    at_most 120000 "$(cat docs/benchmarks/results/*.csv | wc -c)" "bytes of measured results"
+    at_most 600 "$(words README.md)" "words of README.md"
+    at_most 2000 "$(words docs/ARCHITECTURE.md)" "words of docs/ARCHITECTURE.md"
+    at_most 10000 "$(words README.md docs/*.md)" "words of README.md and docs"
+    at_most 60000 "$(cat docs/benchmarks/results/*.csv | wc -c)" "bytes of measured results"
 }
 
 # within SECONDS COMMAND...: runs a command, and ends it with its children after this time. (macOS has no `timeout`.)

@@ -1,4 +1,4 @@
-//! Differences that docs/RAPIER_VERSIONS.md names, each shown beside rapier's own broad phase.
+//! Differences that docs/DROP_IN.md names, each shown beside rapier's own broad phase.
 
 use glam::Vec3;
 use pbig_harness_036::dimension::cuboid;

@@ -19,7 +19,8 @@ fn lines(document: &str) -> Vec<String> {
 
 #[test]
 fn each_line_of_the_programs_is_compiled() {
-    let own = include_str!("documents.rs");
+    // The plug-in's lines in the README are those of its own document.
+    let own = include_str!("documents.rs").to_owned() + &text_of("avian/README.md");
     let lines = ["README.md", "docs/GETTING_STARTED.md"].map(lines).concat();
     assert!(lines.len() > 20, "{lines:?}");
     let missing: Vec<_> = lines.iter().filter(|line| !own.contains(line.as_str())).collect();
@@ -76,5 +77,5 @@ fn the_patch_is_as_long_as_the_documents_say() {
         patch.lines().filter(|line| line.starts_with(sign) && !line.starts_with(header)).count()
     };
     let said = format!("{} lines added, {} removed", count('+', "+++ "), count('-', "--- "));
-    assert!(text_of("docs/RAPIER_VERSIONS.md").contains(&said), "{said}");
+    assert!(text_of("docs/DROP_IN.md").contains(&said), "{said}");
 }

@@ -1,6 +1,6 @@
 //! pbig for rapier 0.36.1: finds the pairs of colliders in place of rapier's own broad phase.
 //!
-//! Rapier 0.36 has no interface for a broad phase of another crate. A small patch adds one; docs/RAPIER_VERSIONS.md of pbig has
+//! Rapier 0.36 has no interface for a broad phase of another crate. A small patch adds one; docs/GETTING_STARTED.md of pbig has
 //! the command that applies it. Then one line changes, and the type of the broad phase stays:
 //!
 //! ```
@@ -63,7 +63,7 @@ pub use pbig_gpu::GpuFinder;
 #[cfg(feature = "shadow")]
 pub use shadow::{Shadow, differences};
 
-use rapier::geometry::{PairFinder, SceneQuery}; // missing? rapier is unpatched: pbig/docs/RAPIER_VERSIONS.md#errors
+use rapier::geometry::{PairFinder, SceneQuery}; // missing? rapier is unpatched: pbig/docs/GETTING_STARTED.md#errors
 use rapier::prelude::BroadPhaseBvh;
 use std::any::Any;
 

@@ -1,5 +1,5 @@
 //! Numbers and worlds at which broad phases break, compared with the oracle: each through the finder on every backend, and
-//! through updates with every engine. docs/STRESS.md lists the tests.
+//! through updates with every engine. CONTRIBUTING.md lists the tests.
 
 mod extremes;
 mod fuzzed;

@@ -1,0 +1,124 @@
+//! The tables of the documents.
+
+/// A table: rows and columns of a CSV file, in the file's order.
+pub(super) struct Table {
+    /// The name, which stands in the mark.
+    pub(super) name: &'static str,
+    /// The file in `docs/benchmarks/results`, without its ending.
+    pub(super) csv: &'static str,
+    /// The columns that choose rows, each with its values, separated by `|`.
+    pub(super) rows: &'static [(&'static str, &'static str)],
+    /// The headings, each with its column, or with several columns that an arrow separates in each cell.
+    pub(super) columns: &'static [(&'static str, &'static str)],
+}
+
+const FRAME: &str = "stock_frame_mean_ms → pbig_frame_mean_ms";
+const FRAME_P99: &str = "stock_frame_p99_ms → pbig_frame_p99_ms";
+const BROAD: &str = "stock_broad_mean_ms → pbig_broad_mean_ms";
+
+/// All tables; each stands in one document.
+#[rustfmt::skip]
+pub(super) const TABLES: &[Table] = &[
+    // README.md
+    Table { name: "frames", csv: "frames-036",
+        rows: &[("scene", "column|pile|city|rain"), ("bodies", "10000|100000"), ("queries", "none")],
+        columns: &[("scene", "scene"), ("bodies", "bodies"), ("mean", FRAME), ("p99", FRAME_P99)] },
+    // docs/PERFORMANCE.md
+    Table { name: "steady", csv: "steady",
+        rows: &[("boxes", "100000"), ("density", "dense"), ("threads", "2"), ("side", "ours")],
+        columns: &[("motion", "motion"), ("mean", "mean_ms"), ("p99", "p99_ms"), ("worst", "worst_ms")] },
+    Table { name: "hard-searches", csv: "hard-searches",
+        rows: &[
+            ("world", "uniform|two scales|mixed sizes above 2^100|needles in three directions|sheets in three directions"),
+            ("boxes", "25000")],
+        columns: &[("world", "world"), ("pairs", "pairs"), ("ms", "ms"), ("with a grid alone", "ms_of_a_grid_alone")] },
+    Table { name: "hard-updates", csv: "hard-updates",
+        rows: &[("history", "cubes that turn|out along a line|tiny ones that gather|mixed up"), ("boxes", "100000")],
+        columns: &[("history", "history"), ("mean", "mean_ms"), ("worst", "worst_ms"),
+            ("search, mean", "search_mean_ms")] },
+    Table { name: "queries", csv: "frames-036",
+        rows: &[("scene", "column"), ("bodies", "10000"), ("queries", "none|ray|rays-100|rays-10000|character")],
+        columns: &[("queries", "queries"), ("frame", FRAME),
+            ("its queries", "stock_queries_mean_ms → pbig_queries_mean_ms")] },
+    Table { name: "crates", csv: "crates-036",
+        rows: &[("scene", "rain|city"), ("bodies", "100000"), ("queries", "none")],
+        columns: &[("crate", "crate"), ("scene", "scene"), ("broad phase", BROAD), ("frame", FRAME)] },
+    Table { name: "steps-027", csv: "step",
+        rows: &[("scene", "column|pile|mixed"), ("bodies", "1000|10000")],
+        columns: &[("scene", "scene"), ("bodies", "bodies"), ("broad phase", BROAD),
+            ("step", "stock_step_mean_ms → pbig_step_mean_ms"),
+            ("step, p99", "stock_step_p99_ms → pbig_step_p99_ms")] },
+    Table { name: "peers", csv: "peers",
+        rows: &[
+            ("case", "events, all moved, unit|events, all drift, unit|events, 1% moved, unit|from scratch, unit"),
+            ("boxes", "100000"),
+            ("other", "parry 0.31, all threads|parry 0.31, changed pairs|parry 0.31 rebuilt|obvhs 0.4 ploc")],
+        columns: &[("case", "case"), ("other", "other"), ("its time over pbig's", "other_over_pbig_median")] },
+    Table { name: "memory", csv: "update",
+        rows: &[("unit", "MB")],
+        columns: &[("case", "case"), ("boxes", "boxes"), ("MB", "pbig_median")] },
+    // docs/DROP_IN.md
+    Table { name: "lookup", csv: "lookup-036", rows: &[],
+        columns: &[("scene", "scene"), ("bodies", "bodies"),
+            ("rapier's own", "rapier_step_mean_ms → mended_step_mean_ms"),
+            ("with pbig", "pbig_step_mean_ms → pbig_mended_step_mean_ms")] },
+    // docs/GPU.md
+    Table { name: "gpu-searches", csv: "gpu-searches",
+        rows: &[("boxes", "10000|100000|1000000|10000000")],
+        columns: &[("set", "set"), ("boxes", "boxes"), ("pairs", "pairs"), ("CPU → GPU, ms", "cpu_ms → gpu_ms"),
+            ("GPU alone, ms", "wait_ms")] },
+    Table { name: "gpu-compilers", csv: "gpu-compilers",
+        rows: &[("kernel", "locate|schedule|scatter|check_small|check_large|rank_windows")],
+        columns: &[("kernel", "kernel"), ("FXC, s", "seconds"), ("AMD, registers", "vgprs"),
+            ("AMD, waves a SIMD", "waves")] },
+    // docs/ACCURACY.md
+    Table { name: "index", csv: "accuracy-index-all-pairs",
+        rows: &[("correction", "as it is")],
+        columns: &[("root", "root"), ("wrong, %", "wrong_percent"), ("first wrong n", "first_wrong_n")] },
+    Table { name: "coordinates", csv: "accuracy-coordinates-means", rows: &[],
+        columns: &[("coordinates", "coordinates"), ("time of tests", "time_of_tests"),
+            ("with the rounding", "with_the_rounding"), ("bytes read", "bytes_read"),
+            ("most spurious pairs, %", "largest_spurious_percent")] },
+    Table { name: "margin", csv: "accuracy-margin-means", rows: &[],
+        columns: &[("margin", "margin"), ("broad phase", "broad_phase"), ("noise, %", "broad_phase_noise_percent"),
+            ("whole step", "whole_step"), ("noise, %", "whole_step_noise_percent"),
+            ("most extra pairs, %", "largest_extra_percent")] },
+    Table { name: "far", csv: "accuracy-wide-ways",
+        rows: &[("offset", "100000|1000000")],
+        columns: &[("distance", "offset"), ("boxes", "boxes"), ("pairs at the poses", "pairs_at_the_poses"),
+            ("missed at the poses", "missed_at_the_poses"), ("missed against f64", "missed")] },
+    Table { name: "drift", csv: "accuracy-simulation-drift", rows: &[],
+        columns: &[("scene", "scene"), ("steps", "steps"), ("farthest permuted run", "farthest_permuted"),
+            ("pbig", "pbig"), ("stock, its events sorted", "stock_sorted")] },
+    // docs/PAPERS.md
+    Table { name: "papers-density", csv: "papers-pbig-table-iii-and-figure-10-density", rows: &[],
+        columns: &[("DoC", "DoC"), ("pairs", "pairs printed (N = 10^7) → pairs"),
+            ("checks", "checks printed (N = 10^7) → checks in such cells"), ("ms, pbig's grid", "ms, our grid, CPU")] },
+    Table { name: "papers-cells", csv: "papers-pbig-figure-9-size-of-cells",
+        rows: &[("boxes", "10000000")],
+        columns: &[("cell", "cell wanted"), ("checks", "checks"),
+            ("ms, PBIG's grid", "ms, PBIG's grid, CPU, one thread")] },
+    Table { name: "papers-bytes", csv: "papers-pbig-table-iii-and-figure-10-density-and-bytes-of-output-gpu", rows: &[],
+        columns: &[("DoC", "DoC"), ("printed", "bytes a pair, MB = 2^20"), ("here", "records"),
+            ("here, with the paper's cells", "records, the paper's W, rows of segments")] },
+    Table { name: "papers-options", csv: "papers-pbig-table-iv-optimisations-on-and-off-gpu",
+        rows: &[("setting", "baseline|+C|+P|+B|+C+P+B")],
+        columns: &[("setting", "setting"), ("side", "side"), ("ms", "total, ms"),
+            ("speed-up", "speed-up by the totals")] },
+    Table { name: "papers-grid", csv: "papers-avril-figure-4-and-table-7-brute-force-with-and-without-a-grid",
+        rows: &[("objects", "100|1000|10000")],
+        columns: &[("objects", "objects"),
+            ("printed: without a grid → with it", "ms printed: without grid → ms printed: with grid"),
+            ("here: brute force → Avril's cells", "ms, CPU: brute force → ms, CPU: Avril's cells, one thread"),
+            ("pbig's grid", "ms, CPU: our grid")] },
+    // docs/ARCHITECTURE.md
+    Table { name: "mechanisms", csv: "mechanisms",
+        rows: &[("verdict", "stays")],
+        columns: &[("mechanism", "mechanism"), ("scene", "scene"), ("without / with", "without_over_with")] },
+    // avian/README.md
+    Table { name: "avian", csv: "avian", rows: &[],
+        columns: &[("scene", "scene"), ("bodies", "bodies"),
+            ("broad phase", "avian_broad_mean_ms → pbig_broad_mean_ms"),
+            ("step", "avian_step_mean_ms → pbig_step_mean_ms"),
+            ("step, p99", "avian_step_p99_ms → pbig_step_p99_ms")] },
+];
