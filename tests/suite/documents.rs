@@ -55,7 +55,7 @@ fn render(table: &Table, csv: &str) -> Result<String, String> {
     }
     let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
     let headings = table.columns.iter().map(|(heading, _)| heading.to_string()).collect();
-    let mut text = line(headings) + &line(vec!["---".into(); table.columns.len()]);
+    let mut text = line(headings) + "|" + &"---|".repeat(table.columns.len()) + "\n";
     for row in &rows {
         text += &line(table.columns.iter().map(|(_, columns)| cell(row, columns)).collect::<Result<_, _>>()?);
     }
@@ -140,7 +140,7 @@ const ROWS: Table = Table {
     columns: &[("scene", "scene"), ("ms, pairs", "ms → pairs")],
 };
 
-const DOCUMENT: &str = "A 3.15.\n\n<!-- table: rows -->\n| scene | ms, pairs |\n| --- | --- |\n\
+const DOCUMENT: &str = "A 3.15.\n\n<!-- table: rows -->\n| scene | ms, pairs |\n|---|---|\n\
     | rain | 3.14\u{a0}→\u{a0}12,345,678 |\n| pile, big | 0.001\u{a0}→\u{a0}7 |\n\n_machine: PC, cores: 2, day: 2026-11-25_\n\n<!-- end -->\n\n9\n";
 
 #[test]
