@@ -7,6 +7,9 @@ use crate::{Aabb, BoxIndex};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
+/// Maximum share of changed boxes, as one in this number, that a stale tree lists. Beyond it a refresh reads all boxes anyway.
+const KNOWN_CHANGES_IN: usize = 8;
+
 /// A tree that knows all boxes, or all that may have changed since it did.
 #[derive(Debug, Default)]
 pub(super) struct Tree {
@@ -78,8 +81,8 @@ impl Tree {
             return;
         }
         let stale = self.stale_mut();
-        // A longer list saves nothing, because then all boxes are read.
-        stale.knows_changes &= stale.changed.len() + world.changed.len() <= world.present.len() / 8;
+        let changed = stale.changed.len() + world.changed.len();
+        stale.knows_changes &= changed <= world.present.len() / KNOWN_CHANGES_IN;
         if stale.knows_changes {
             stale.changed.extend_from_slice(&world.changed);
         } else {

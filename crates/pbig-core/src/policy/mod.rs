@@ -1,8 +1,8 @@
 //! The choices of engine, backend, cells and threads, and their constants. A choice is a fixed rule on counts, never on a clock:
 //! the same boxes and the same calls take the same path on every machine.
 //!
-//! Constants of plans and threads are here; `engine` chooses how an update is made, `search` and `bvh` have the budgets and the upkeep of the tree, `backend` where a call runs. A constant that
-//! one file alone uses stands in that file.
+//! Constants of plans and threads are here. `engine` chooses how an update is made, `backend` where a call runs. `search` has the
+//! budgets of a search, and `bvh` the upkeep of the tree. A constant that one file alone uses stands in that file.
 
 mod backend;
 pub(crate) mod bvh;
@@ -21,6 +21,9 @@ pub(crate) const PARALLEL_FROM_BOXES: usize = 16_384;
 /// Maximum number of boxes for a test of every pair, eight at a time: a grid takes longer.
 pub(crate) const BRUTE_FORCE_UP_TO_BOXES: usize = 400;
 
+/// Maximum number of boxes of the smaller of two sets for a test of every pair: a test takes 1.3 ns, sorting a box about 25.
+pub(crate) const FEW_BOXES: usize = 16;
+
 /// Wanted number of boxes in a cell, where density and not size decides about cells.
 pub(crate) const BOXES_PER_CELL: f64 = 0.5;
 
@@ -34,7 +37,8 @@ pub(crate) const MIN_CELLS: f64 = 4096.0;
 pub(crate) const RUNS_UP_TO_PER_CELL: f64 = 3.0;
 
 /// Maximum mean number of boxes of both sets in a cell of 64 steps, for their cells to have 128, if the sample sees
-/// no crowd: windows have few rows, which fit a block of codes or two. A search of sparse sets took half as long, and one of dense sets would test two to three times as many.
+/// no crowd. A search of sparse sets took half as long, because windows have fewer rows. One of dense sets would test two to three times
+/// as many boxes.
 pub(crate) const LONG_CELLS_UP_TO_PER_CELL: f64 = 1.0;
 
 /// Maximum extent of a box that a grid takes, in extents of its largest box: a cube that turns by 10 degrees grows this much.
@@ -63,6 +67,3 @@ pub(crate) const SPARSE_FROM_ID: u32 = 1 << 24;
 
 /// Maximum factor between a new id and the number of known ids, for ids from [`SPARSE_FROM_ID`] on.
 pub(crate) const MAX_ID_GROWTH: u32 = 64;
-
-/// Maximum number of boxes of the smaller of two sets for a test of every pair: a test takes 1.3 ns, sorting a box about 25.
-pub(crate) const FEW_BOXES: usize = 16;
