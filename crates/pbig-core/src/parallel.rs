@@ -170,21 +170,25 @@ pub(crate) fn run_with<T: Send>(own: &mut [T], pieces: usize, work: impl Fn(&mut
     });
 }
 
-/// Runs `work(piece, part)` once for each part of what was split among pieces of work, on at most `workers` threads.
+/// Runs `work(piece, part)` once for each part of a split list, on at most `workers` threads.
 pub(crate) fn run_parts<P: Send>(
     workers: usize,
     parts: impl IntoIterator<Item = P>,
     work: impl Fn(usize, P) + Sync,
 ) {
+    // Without a size, so the list takes no memory.
     run_parts_with(&mut vec![(); workers], parts, |(), piece, part| work(piece, part));
 }
 
-/// As [`run_parts`], on at most as many threads as there are `own` values: each thread has one of them.
+/// As [`run_parts`]. Each thread has an `own` value, so there are at most as many threads as values.
 pub(crate) fn run_parts_with<T: Send, P: Send>(
     own: &mut [T],
     parts: impl IntoIterator<Item = P>,
     work: impl Fn(&mut T, usize, P) + Sync,
 ) {
+    if let [own] = own {
+        return parts.into_iter().enumerate().for_each(|(piece, part)| work(own, piece, part));
+    }
     let mut parts: Vec<Option<P>> = parts.into_iter().map(Some).collect();
     let (pieces, shared) = (parts.len(), SharedSlice::new(&mut parts));
     run_with(own, pieces, |own, piece| {
@@ -238,6 +242,29 @@ pub(crate) fn ensure_scratch<T: Copy>(buffer: &mut Vec<T>, len: usize, fill: T) 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_of_a_list_are_handed_out_once_each_on_any_number_of_threads() {
+        for workers in [1, 2, 5] {
+            for pieces in [0, 1, 3, 40] {
+                let mut list: Vec<usize> = (0..100).collect();
+                let (lens, mut own) = ((0..pieces).map(|piece| piece % 4), vec![0; workers]);
+                let used = lens.clone().sum::<usize>();
+                run_parts_with(&mut own, split_into(&mut list, lens), |own, piece, part| {
+                    assert_eq!(part.len(), piece % 4);
+                    *own += part.len();
+                    part.iter_mut().for_each(|number| *number += 1000);
+                });
+                assert_eq!(own.iter().sum::<usize>(), used);
+                assert!(
+                    list.iter().enumerate().all(|(i, number)| *number == i + 1000 * usize::from(i < used))
+                );
+                let parts = split_evenly(&mut list, pieces).map(|part| part.len());
+                assert_eq!(parts.sum::<usize>(), if pieces == 0 { 0 } else { 100 });
+            }
+        }
+        assert_eq!(split_evenly::<u8>(&mut [], 3).map(|part| part.len()).collect::<Vec<_>>(), [0; 3]);
+    }
 
     #[test]
     fn a_scratch_buffer_has_an_eighth_to_spare_and_a_large_one_less() {

@@ -5,7 +5,7 @@ use super::kept::{Kept, Rows};
 use super::row::{self, equal};
 use crate::Pair;
 use crate::memory::ShrinkingVec;
-use crate::parallel::split_into;
+use crate::parallel::{run_parts_with, split_into};
 use crate::simd::{Simd, dispatch};
 use std::ops::Range;
 
@@ -46,25 +46,24 @@ impl Comparison {
         self.parts.resize_with(grouping.count, Part::default);
         let old = &kept.forward;
         let ids = (0..grouping.count).map(|group| grouping.ids_of(group).len());
-        let places = (0..grouping.count).map(|group| found.range(group).len()).collect::<Vec<_>>();
+        let mut sorters = found.take_sorters(workers);
+        let pairs = &*found;
+        let places = (0..grouping.count).map(|group| pairs.range(group).len());
         let Rows { spans, pool } = &mut *next;
-        let rows = split_into(spans, ids).zip(split_into(pool, places));
-        found.for_each(
-            workers,
-            self.parts.iter_mut().zip(rows),
-            |found, sorter, group, (part, (spans, pool))| {
-                let (first_id, first_place) =
-                    (grouping.ids_of(group).start as u32, found.range(group).start as u32);
-                part.added.clear();
-                part.removed.clear();
-                found.sort::<false>(group, sorter, spans, pool, first_place);
-                if found.may_repeat {
-                    groups::drop_repeated(spans, pool, first_place);
-                }
-                let new = NewRows { names, first_id, first_place, spans, pool };
-                dispatch!(Part::compare, part, old, &new);
-            },
-        );
+        let parts = self.parts.iter_mut().zip(split_into(spans, ids).zip(split_into(pool, places)));
+        run_parts_with(&mut sorters[..workers], parts, |sorter, group, (part, (spans, pool))| {
+            let (first_id, first_place) =
+                (grouping.ids_of(group).start as u32, pairs.range(group).start as u32);
+            part.added.clear();
+            part.removed.clear();
+            pairs.sort::<false>(group, sorter, spans, pool, first_place);
+            if pairs.may_repeat {
+                groups::drop_repeated(spans, pool, first_place);
+            }
+            let new = NewRows { names, first_id, first_place, spans, pool };
+            dispatch!(Part::compare, part, old, &new);
+        });
+        found.sorters = sorters;
         kept.next = next;
         self.gather();
         kept.adopt_next(names, &self.added, &self.removed);

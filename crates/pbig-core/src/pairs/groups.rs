@@ -64,7 +64,7 @@ pub(crate) struct Groups {
     /// By group: its first pair; then the number of pairs.
     starts: Vec<u32>,
     /// By thread.
-    sorters: Vec<Sorter>,
+    pub(super) sorters: Vec<Sorter>,
 }
 
 impl Groups {
@@ -137,37 +137,30 @@ impl Groups {
     pub(crate) fn list(&mut self, list: &mut Vec<Pair>, workers: usize) {
         list.clear();
         list.reserve(self.len());
-        let lens = (0..self.grouping.count).map(|group| self.range(group).len()).collect::<Vec<_>>();
+        let mut sorters = self.take_sorters(workers);
+        let lens = (0..self.grouping.count).map(|group| self.range(group).len());
         let parts = split_into(list.spare_capacity_mut(), lens);
-        self.for_each(workers, parts, |groups, sorter, group, pairs| {
+        run_parts_with(&mut sorters[..workers], parts, |sorter, group, pairs| {
             let spans = &mut std::mem::take(&mut sorter.spans);
             let others = &mut std::mem::take(&mut sorter.others);
-            spans.resize(groups.grouping.ids_of(group).len(), Span::default());
+            spans.resize(self.grouping.ids_of(group).len(), Span::default());
             ensure_scratch(others, pairs.len(), 0);
-            groups.sort::<true>(group, sorter, spans, &mut others[..pairs.len()], 0);
+            self.sort::<true>(group, sorter, spans, &mut others[..pairs.len()], 0);
             for ((to, &a), &b) in pairs.iter_mut().zip(&*sorter.firsts).zip(&**others) {
                 to.write(Pair { a, b });
             }
             (sorter.spans, sorter.others) = (std::mem::take(spans), std::mem::take(others));
         });
+        self.sorters = sorters;
         // SAFETY: all groups have written their pairs.
         unsafe { list.set_len(self.len()) };
     }
 
-    /// Hands each group to `work`, with the buffers of a thread and a part of what was split among the groups.
-    pub(super) fn for_each<P: Send>(
-        &mut self,
-        workers: usize,
-        parts: impl IntoIterator<Item = P>,
-        work: impl Fn(&Self, &mut Sorter, usize, P) + Sync,
-    ) {
+    /// Takes the buffers of the threads that sort groups, to be put back.
+    pub(super) fn take_sorters(&mut self, workers: usize) -> Vec<Sorter> {
         let mut sorters = std::mem::take(&mut self.sorters);
         sorters.resize_with(workers.max(sorters.len()), Sorter::default);
-        let groups = &*self;
-        run_parts_with(&mut sorters[..workers], parts, |sorter, group, part| {
-            work(groups, sorter, group, part)
-        });
-        self.sorters = sorters;
+        sorters
     }
 
     /// Sorts a group: the `b` of each pair into `others`, row by row, and where each row lies, counted from `base`; with

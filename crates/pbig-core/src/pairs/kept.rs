@@ -203,9 +203,10 @@ impl Kept {
         pool.resize(next as usize, 0);
         let pieces = if self.len < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
         let ids = spans.len();
-        let places =
-            |piece| self.lower[piece_range(ids, piece, pieces)].iter().map(|len| *len as usize).sum();
-        let parts = split_evenly(&mut spans, pieces).zip(split_into(&mut pool, (0..pieces).map(places)));
+        let start = |piece| spans.get(piece_range(ids, piece, pieces).start).map_or(next, |span| span.start);
+        let places: Vec<usize> =
+            (0..pieces).map(|piece| (start(piece + 1) - start(piece)) as usize).collect();
+        let parts = split_evenly(&mut spans, pieces).zip(split_into(&mut pool, places));
         run_parts(pieces, parts, |piece, (spans, pool)| {
             let own = piece_range(ids, piece, pieces);
             let Some(first) = spans.first().map(|span| span.start as usize) else { return };

@@ -154,13 +154,13 @@ impl Primitives for Avx2 {
     }
 
     #[inline(always)]
-    fn free(self, add: u64, taken: u64, codes: &[u64; BLOCK]) -> u32 {
+    fn lacks_bits(self, add: u64, bits: u64, codes: &[u64; BLOCK]) -> u32 {
         by!({
-            let (add, taken) = (_mm256_set1_epi64x(add as i64), _mm256_set1_epi64x(taken as i64));
+            let (add, bits) = (_mm256_set1_epi64x(add as i64), _mm256_set1_epi64x(bits as i64));
             // A closure could be left out of line, for which the loops around it are several times as slow.
             let (low, high) = (codes[0..].as_ptr().cast(), codes[BLOCK / 2..].as_ptr().cast());
-            let low = _mm256_and_si256(_mm256_add_epi64(add, _mm256_loadu_si256(low)), taken);
-            let high = _mm256_and_si256(_mm256_add_epi64(add, _mm256_loadu_si256(high)), taken);
+            let low = _mm256_and_si256(_mm256_add_epi64(add, _mm256_loadu_si256(low)), bits);
+            let high = _mm256_and_si256(_mm256_add_epi64(add, _mm256_loadu_si256(high)), bits);
             let low = _mm256_cmpeq_epi64(low, _mm256_setzero_si256());
             let high = _mm256_cmpeq_epi64(high, _mm256_setzero_si256());
             let low = _mm256_movemask_pd(_mm256_castsi256_pd(low)) as u32;
@@ -175,7 +175,8 @@ impl Primitives for Avx2 {
             // Two boxes, four lanes apart, share registers.
             let ((a, a_max), (b, b_max)) = (pair(boxes[0], boxes[4]), pair(boxes[1], boxes[5]));
             let ((c, c_max), (d, d_max)) = (pair(boxes[2], boxes[6]), pair(boxes[3], boxes[7]));
-            let ([x, y, z], [max_x, max_y, max_z]) = (axes(a, b, c, d), axes(a_max, b_max, c_max, d_max));
+            let ([x, y, z], [max_x, max_y, max_z]) =
+                (by_axis(a, b, c, d), by_axis(a_max, b_max, c_max, d_max));
             [x, y, z, max_x, max_y, max_z]
         })
     }
@@ -266,7 +267,7 @@ unsafe fn pair(one: &Aabb, other: &Aabb) -> (__m256, __m256) {
 /// # Safety
 /// The processor has AVX2.
 #[inline(always)]
-unsafe fn axes(a: __m256, b: __m256, c: __m256, d: __m256) -> [__m256i; 3] {
+unsafe fn by_axis(a: __m256, b: __m256, c: __m256, d: __m256) -> [__m256i; 3] {
     // SAFETY: the caller's promise.
     unsafe {
         let (xy, more) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));

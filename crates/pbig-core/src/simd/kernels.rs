@@ -1,18 +1,18 @@
-//! Steps of the inner loops, for every instruction set.
+//! Kernels of the inner loops, for every instruction set.
 
 use super::codes::{APART, SET_BITS, TOMBSTONE};
 use super::{BLOCK, Eight, EightBoxes, Primitives};
 use crate::Aabb;
 
-/// Steps of the inner loops.
+/// Kernels of the inner loops.
 pub(crate) trait Simd: Primitives {
     /// Returns a bit for each of eight codes: set if the two boxes may overlap. Tombstones never do.
     #[inline(always)]
     fn test(self, query: u64, codes: &[u64; BLOCK]) -> u32 {
-        self.free(query, APART | TOMBSTONE, codes)
+        self.lacks_bits(query, APART | TOMBSTONE, codes)
     }
 
-    /// Writes `query` and the places `first + bit` of the set bits of `mask`, any numbers behind them, and returns how many.
+    /// Writes `query` and a place, `first + bit`, for each set bit of `mask`, and any numbers behind them. Returns the number of set bits.
     #[inline(always)]
     fn expand(self, query: u32, first: u32, mask: u32, queries: &mut Eight, places: &mut Eight) -> usize {
         let found = self.widen(SET_BITS[mask as usize & 255]);
@@ -84,8 +84,8 @@ pub(crate) trait Simd: Primitives {
         (least != u32::MAX).then_some(least as usize % BLOCK)
     }
 
-    /// Returns those keys that are at most their limit, and their values, the largest key first and that of [`Simd::nearest`] last, any
-    /// others behind them, and their number.
+    /// Sorts the keys that are at most their limit, with their values: the largest one first, and [`Simd::nearest`] last. Returns both
+    /// rows, with any numbers behind the sorted ones, and the number of these keys.
     #[inline(always)]
     fn farthest_first(
         self,

@@ -1,6 +1,6 @@
-//! Instructions of the inner loops: AVX2 where the processor has it, found at run time; NEON on ARM; plain Rust elsewhere.
+//! Instructions of the inner loops: AVX2 where the processor has it, found at run time; NEON on 64-bit ARM; plain Rust elsewhere.
 //!
-//! An instruction set has [`Primitives`] on registers of eight numbers. The steps of the loops, [`Simd`], are written once on these.
+//! An instruction set has [`Primitives`] on registers of eight numbers. The kernels of the loops, [`Simd`], are written once on these.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -96,8 +96,8 @@ pub(crate) trait Primitives: Copy {
     /// Returns the least of eight integers, without sign.
     fn least(self, row: Self::Row) -> u32;
 
-    /// Adds a number to each of eight codes. Returns a bit for each sum that has no bit of `taken`.
-    fn free(self, add: u64, taken: u64, codes: &[u64; BLOCK]) -> u32;
+    /// Adds a number to each of eight codes. Returns a bit for each sum that has none of `bits`.
+    fn lacks_bits(self, add: u64, bits: u64, codes: &[u64; BLOCK]) -> u32;
 
     /// Returns eight boxes axis by axis.
     fn transpose(self, boxes: [&Aabb; BLOCK]) -> [Self::Row; 6];
@@ -138,29 +138,31 @@ pub(crate) trait Primitives: Copy {
     /// Returns eight integers, sorted, by a network of six steps.
     #[inline(always)]
     fn sorted(self, row: Self::Row) -> Self::Row {
-        const PAIRS: Eight = [1, 0, 3, 2, 5, 4, 7, 6];
-        const FOURS: Eight = [3, 2, 1, 0, 7, 6, 5, 4];
-        const TWOS: Eight = [2, 3, 0, 1, 6, 7, 4, 5];
-        const EIGHT: Eight = [7, 6, 5, 4, 3, 2, 1, 0];
-        let row = exchange(self, row, PAIRS, 0b1010_1010);
-        let row = exchange(self, row, FOURS, 0b1100_1100);
-        let row = exchange(self, row, PAIRS, 0b1010_1010);
-        let row = exchange(self, row, EIGHT, 0b1111_0000);
-        let row = exchange(self, row, TWOS, 0b1100_1100);
-        exchange(self, row, PAIRS, 0b1010_1010)
+        const PAIRS: [Eight; 2] = [[1, 0, 3, 2, 5, 4, 7, 6], upper(0b1010_1010)];
+        const TWOS: [Eight; 2] = [[2, 3, 0, 1, 6, 7, 4, 5], upper(0b1100_1100)];
+        const FOURS: [Eight; 2] = [[3, 2, 1, 0, 7, 6, 5, 4], upper(0b1100_1100)];
+        const EIGHT: [Eight; 2] = [[7, 6, 5, 4, 3, 2, 1, 0], upper(0b1111_0000)];
+        let row = exchange(self, exchange(self, row, &PAIRS), &FOURS);
+        let row = exchange(self, exchange(self, row, &PAIRS), &EIGHT);
+        exchange(self, exchange(self, row, &TWOS), &PAIRS)
     }
 }
 
-/// Compares each number with a partner's: lanes of `upper` get the greater one, others the lesser one.
+/// Returns a mask of the lanes whose bits are set.
+const fn upper(bits: u32) -> Eight {
+    let (mut mask, mut lane) = ([0; BLOCK], 0);
+    while lane < BLOCK {
+        mask[lane] = (bits >> lane & 1).wrapping_neg();
+        lane += 1;
+    }
+    mask
+}
+
+/// Compares each number with a partner's: the upper lanes get the greater one, the others the lesser one.
 #[inline(always)]
-fn exchange<P: Primitives>(simd: P, row: P::Row, partners: Eight, upper: u32) -> P::Row {
-    let other = simd.permute(row, simd.load(&partners));
-    let mut lanes = [0; BLOCK];
-    (0..BLOCK).for_each(
-        #[inline(always)]
-        |lane| lanes[lane] = (upper >> lane & 1).wrapping_neg(),
-    );
-    simd.select(simd.load(&lanes), simd.max(row, other), simd.min(row, other))
+fn exchange<P: Primitives>(simd: P, row: P::Row, [partners, upper]: &[Eight; 2]) -> P::Row {
+    let other = simd.permute(row, simd.load(partners));
+    simd.select(simd.load(upper), simd.max(row, other), simd.min(row, other))
 }
 
 /// Borrows eight numbers of a list, from a place on.

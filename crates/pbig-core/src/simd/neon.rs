@@ -135,20 +135,19 @@ impl Primitives for Neon {
     }
 
     #[inline(always)]
-    fn free(self, add: u64, taken: u64, codes: &[u64; BLOCK]) -> u32 {
+    fn lacks_bits(self, add: u64, bits: u64, codes: &[u64; BLOCK]) -> u32 {
         by!({
-            let (add, taken) = (vdupq_n_u64(add), vdupq_n_u64(taken));
-            let [a, b, c, d] = [0, 2, 4, 6].map(|first| {
-                let sum = vaddq_u64(add, vld1q_u64(codes[first..].as_ptr()));
-                vmovn_u64(vtstq_u64(sum, taken))
-            });
+            let (add, bits, start) = (vdupq_n_u64(add), vdupq_n_u64(bits), codes.as_ptr());
+            let has_bit = |codes| vmovn_u64(vtstq_u64(vaddq_u64(add, codes), bits));
+            let (a, b) = (has_bit(vld1q_u64(start)), has_bit(vld1q_u64(start.add(2))));
+            let (c, d) = (has_bit(vld1q_u64(start.add(4))), has_bit(vld1q_u64(start.add(6))));
             !self.bits([vcombine_u32(a, b), vcombine_u32(c, d)]) & 255
         })
     }
 
     #[inline(always)]
     fn transpose(self, boxes: [&Aabb; BLOCK]) -> [Row; 6] {
-        let (a, b) = (axes(&boxes[..4]), axes(&boxes[4..]));
+        let (a, b) = (by_axis(&boxes[..4]), by_axis(&boxes[4..]));
         [[a[0], b[0]], [a[1], b[1]], [a[2], b[2]], [a[3], b[3]], [a[4], b[4]], [a[5], b[5]]]
     }
 
@@ -165,7 +164,7 @@ impl Primitives for Neon {
 
 /// Returns four boxes axis by axis.
 #[inline(always)]
-fn axes(boxes: &[&Aabb]) -> [uint32x4_t; 6] {
+fn by_axis(boxes: &[&Aabb]) -> [uint32x4_t; 6] {
     // SAFETY: NEON is part of the architecture. A box is six numbers; the loads are of the first four and the last four.
     unsafe {
         let load = |lane: usize, from| vld1q_f32(std::ptr::from_ref(boxes[lane]).cast::<f32>().add(from));

@@ -115,9 +115,9 @@ impl Primitives for Portable {
     }
 
     #[inline(always)]
-    fn free(self, add: u64, taken: u64, codes: &[u64; BLOCK]) -> u32 {
-        let is_free = |code: u64| add.wrapping_add(code) & taken == 0;
-        (0..BLOCK).fold(0, |bits, lane| bits | u32::from(is_free(codes[lane])) << lane)
+    fn lacks_bits(self, add: u64, bits: u64, codes: &[u64; BLOCK]) -> u32 {
+        let lacks = |code: u64| add.wrapping_add(code) & bits == 0;
+        (0..BLOCK).fold(0, |bits, lane| bits | u32::from(lacks(codes[lane])) << lane)
     }
 
     #[inline(always)]

@@ -184,7 +184,9 @@ pub fn size_classes(boxes: &[Aabb], workers: usize) -> SizeClasses {
     if workers <= 1 {
         return classes_of(boxes);
     }
-    let parts = map(workers, |piece| classes_of(&boxes[piece_range(boxes.len(), piece, workers)]));
+    // Each piece has counts of 256 classes.
+    let pieces = workers.min(16);
+    let parts = map(pieces, |piece| classes_of(&boxes[piece_range(boxes.len(), piece, pieces)]));
     let mut all = NO_CLASSES;
     for part in &parts {
         all.iter_mut().zip(part).for_each(|(all, part)| all.add(part));
