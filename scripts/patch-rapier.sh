@@ -3,13 +3,14 @@
 #
 #     patch-rapier.sh [PROJECT]                 makes PROJECT/patched/rapier3d-0.36.1 (PROJECT: the current folder)
 #     patch-rapier.sh --crate NAME [PROJECT]    for this crate; once or more. Default: the crates of rapier in PROJECT's Cargo.lock,
-#                                               else in its manifests, else rapier3d
+#                                               else in its manifests
 #     patch-rapier.sh --edge-lookup [PROJECT]   also mends rapier's lookup of pairs: see patches/
-#     patch-rapier.sh --undo [PROJECT]          removes the copies
+#     patch-rapier.sh --undo [PROJECT]          removes the copies, and prints the lines to remove
+#     patch-rapier.sh --help                    prints this text
 #
 # One patch serves rapier2d, rapier2d-f64, rapier3d and rapier3d-f64, whose sources are the same.
 # It needs cargo and patch. The source comes from the registry that cargo uses. Run it again at any time: it starts over.
-# In a workspace the copies belong to the root. Name the folder of the member that uses rapier to see the lines for its manifest.
+# In a workspace the copies belong to the root. PROJECT may be its folder or that of any member. Other versions of rapier are refused.
 set -euo pipefail
 
 version=0.36.1
@@ -21,37 +22,101 @@ fail() {
     exit 1
 }
 
+# show_help: the comment at the beginning of this file.
+show_help() { sed -n '2,/^set /{s/^# \{0,1\}//p;}' "${BASH_SOURCE[0]}"; }
+
 is_undo=false
 crates=
 while [ $# -gt 0 ]; do
     case $1 in
+    --help | -h) show_help && exit 0 ;;
     --undo) is_undo=true ;;
     --edge-lookup) patches+=("$clone/patches/rapier3d+$version-edge-lookup.patch") ;;
     --crate)
         case ${2:-} in rapier[23]d | rapier[23]d-f64) ;; *) fail "--crate needs rapier2d, rapier2d-f64, rapier3d or rapier3d-f64" ;; esac
         crates+=" $2" && shift
         ;;
-    -*) fail "unknown option '$1': --undo, --edge-lookup or --crate" ;;
+    -*) fail "unknown option '$1': --crate NAME, --edge-lookup, --undo or --help" ;;
     *) break ;;
     esac
     shift
 done
+[ $# -lt 2 ] || fail "'$2' after the folder '$1': options go before it"
 project="${1:-.}"
 [ -f "$project/Cargo.toml" ] || fail "no Cargo.toml in '$project': name the folder of your project"
 project="$(cd "$project" && pwd -P)"
-member="$project"
 # The workspace, if there is one: cargo reads patches and versions there. On Windows cargo writes backslashes.
 if manifest="$(cd "$project" && cargo locate-project --workspace --message-format plain 2>/dev/null)"; then
     project="$(cd "$(dirname "${manifest//\\//}")" && pwd -P)"
 fi
 
+# Neither rapier nor the patched copies need to be there yet: this reads manifests alone.
+read_manifests() { (cd "$project" && cargo metadata --no-deps --format-version 1); }
+about="$(read_manifests 2>/dev/null)" || about=
+
+# is_own MANIFEST: pbig's, if the clone lies in the project, or a patched copy's.
+is_own() {
+    case $1 in
+    "$project"/patched/*) ;;
+    "$clone"/*) case $clone in "$project"/*) ;; *) return 1 ;; esac ;;
+    *) return 1 ;;
+    esac
+}
+
+# uses_of_rapier: a line "CRATE REQUIREMENT<tab>MANIFEST" for each dependency of a member on rapier or bevy_rapier.
+uses_of_rapier() {
+    local use manifest
+    grep -oE '"name":"(bevy_)?rapier[23]d(-f64)?","source":[^,]*,"req":"[^"]*"|"manifest_path":"[^"]*"' <<<"${about//\\\\//}" |
+        awk -F'"' '$2 == "name" { uses[n++] = $4 " " $(NF - 1) }
+            $2 == "manifest_path" { for (i = 0; i < n; i++) print uses[i] "\t" $4; n = 0 }' | sort -u |
+        while IFS=$'\t' read -r use manifest; do is_own "$manifest" || printf '%s\t%s\n' "$use" "$manifest"; done
+}
+uses="$(uses_of_rapier)" || true
+
+# takes_patch CRATE REQUIREMENT: returns 1 if the requirement is of another version. Cargo decides about ranges.
+takes_patch() {
+    case "$1 $2" in
+    bevy_*' '[=^~]0.37* | rapier*' '[=^~]0.36 | rapier*' '[~^]0.36.0 | rapier*' '[=^~]0.36.1 | *[*,\<\>]*) ;;
+    *) return 1 ;;
+    esac
+}
+
+# crates_of MANIFEST: the crates of rapier, among those to patch, that a member uses.
+crates_of() {
+    local use manifest name
+    while IFS=$'\t' read -r use manifest; do
+        name=${use%% *}
+        [ "$manifest" = "$1" ] && takes_patch "$name" "${use#* }" || continue
+        case " $crates " in *" ${name#bevy_} "*) echo "${name#bevy_}" ;; esac
+    done <<<"$uses" | sort -u
+}
+
+# users: the manifests of the members that use a crate to patch.
+users() {
+    local manifest
+    cut -f 2 <<<"$uses" | sort -u | while read -r manifest; do [ -z "$(crates_of "$manifest")" ] || echo "$manifest"; done
+}
+
+# members: the manifests of the project.
+members() { { echo "$project/Cargo.toml" && grep -oE '"manifest_path":"[^"]*"' <<<"${about//\\\\//}" | cut -d'"' -f4; } | sort -u; }
+
+# lines_to_remove: a line "FILE:NUMBER:TEXT" for each line of a manifest that names pbig's crates or a patched copy.
+lines_to_remove() {
+    members | while read -r manifest; do
+        is_own "$manifest" || grep -HnE 'rapier[23]d(-f64)?-pbig|patched/rapier[23]d' "$manifest" || true
+    done
+}
+
 if $is_undo; then
     rm -rf "$project"/patched/rapier[23]d-"$version" "$project"/patched/rapier[23]d-f64-"$version"
     rmdir "$project/patched" 2>/dev/null || true
+    lines="$(lines_to_remove)" || true
+    [ -n "$lines" ] || lines="(no manifest names pbig's crates or a copy)"
     cat <<TEXT
 Removed the copies in $project/patched.
-Remove from $project/Cargo.toml the lines of rapier under [patch.crates-io]. Remove the dependency on pbig's crate and its use in
-the code.
+Remove pbig's calls from the code, and these lines from the manifests:
+
+$lines
 TEXT
     exit 0
 fi
@@ -62,32 +127,54 @@ versions_of() {
         awk -v wanted="\"$1\"" '$1 == "name" && $3 == wanted { getline; gsub(/"/, "", $3); print $3 }' "$project/Cargo.lock"
 }
 
-# manifests: the project's manifests, without those of pbig and of patched copies.
-manifests() {
-    ls "$project"/Cargo.toml "$project"/*/Cargo.toml "$project"/*/*/Cargo.toml 2>/dev/null |
-        grep -vF -e "$clone/" -e "$project/patched/"
+# is_locked CRATE: Cargo.lock has the patch's version. Returns 1 if it has another, which would not be replaced; sets `other` to it.
+is_locked() {
+    local found
+    found="$(versions_of "$1")"
+    case $'\n'$found$'\n' in
+    *$'\n'"$version"$'\n'*) return 0 ;;
+    $'\n\n') ;;
+    *)
+        other="$project/Cargo.lock has $1 ${found//$'\n'/, }"
+        cure=". If it is $version there, run 'cargo update -p $1 --precise $version'"
+        ;;
+    esac
+    return 1
 }
 
-# find_crates: sets `crates` to the crates of rapier that the project has, at the patch's version where it has a lock file.
-find_crates() {
-    local crate other=
-    for crate in rapier2d rapier2d-f64 rapier3d rapier3d-f64; do
-        found="$(versions_of $crate)"
-        # Another version would not be replaced by the patched one.
-        case $'\n'$found$'\n' in
-        *$'\n'"$version"$'\n'*) crates+=" $crate" ;;
-        $'\n\n') ;;
-        *) other="$crate ${found//$'\n'/, }" ;;
-        esac
-    done
-    [ -n "$crates" ] || [ -z "$other" ] ||
-        fail "$project/Cargo.lock has $other; the patch is for $version: change your dependency, or run" \
-            "'cargo update -p ${other%% *} --precise $version'"
-    [ -n "$crates" ] || crates="$(manifests | tr '\n' '\0' | xargs -0 grep -ohE '\b(bevy_)?rapier[23]d(-f64)?\b' |
-        sed 's/^bevy_//' | sort -u)" || true
-    crates=${crates:-rapier3d}
+# check_other: fails if another version was found.
+check_other() {
+    case $other in
+    '') return 0 ;;
+    *rapier3d*0.27*) cure=". Rapier3d 0.27 needs no patch: use pbig's crate rapier-pbig, without this script" ;;
+    esac
+    fail "$other; the patch is for $version (bevy_rapier 0.37): change the version in your manifest$cure"
 }
-[ -n "$crates" ] || find_crates
+
+# find_crates: sets `crates` to the crates of rapier that the project has at the patch's version, in Cargo.lock or else in manifests.
+find_crates() {
+    local crate use manifest
+    for crate in rapier2d rapier2d-f64 rapier3d rapier3d-f64; do
+        ! is_locked $crate || crates+=" $crate"
+    done
+    [ -z "$crates" ] || return 0
+    check_other
+    [ -n "$about" ] || fail "mend the manifest, or name rapier's crate by --crate: $(read_manifests 2>&1 || true)"
+    [ -n "$uses" ] || fail "nothing in $project depends on rapier: run 'cargo add rapier3d@$version' (or rapier2d, with or" \
+        "without -f64) in the package that needs it, or name a crate by --crate"
+    while IFS=$'\t' read -r use manifest; do
+        crate=${use%% *}
+        if takes_patch "$crate" "${use#* }"; then crates+=" ${crate#bevy_}"; else other="$manifest asks for $use"; fi
+    done <<<"$uses"
+    [ -n "$crates" ] || check_other
+}
+other='' cure=''
+if [ -n "$crates" ]; then
+    for crate in $crates; do is_locked "$crate" || check_other; done
+else
+    find_crates
+fi
+crates="$(tr ' ' '\n' <<<"$crates" | sort -u | xargs)"
 
 command -v patch >/dev/null || fail "the program 'patch' is missing: install it (Debian: apt install patch)"
 for file in "${patches[@]}"; do
@@ -135,7 +222,7 @@ make_copy() {
 }
 for crate in $crates; do make_copy "$crate"; done
 
-# lines_for FOLDER: the dependencies as FOLDER's manifest names them. Their paths are relative if the clone lies in the project.
+# lines_for FOLDER CRATE...: the dependencies as FOLDER's manifest names them. Their paths are relative if the clone lies in the project.
 lines_for() {
     local folder=$1 up= home crate
     case $clone in
@@ -145,7 +232,8 @@ lines_for() {
         ;;
     *) home=$clone ;;
     esac
-    for crate in $crates; do echo "    $crate-pbig = { path = \"$home/rapier-0.36/$crate-pbig\" }"; done
+    shift
+    for crate in "$@"; do echo "    $crate-pbig = { path = \"$home/rapier-0.36/$crate-pbig\" }"; done
 }
 
 # has_table NAME MANIFEST
@@ -155,13 +243,6 @@ patch_lines="    [patch.crates-io]$(for crate in $crates; do printf '\n    %s = 
 if has_table workspace "$project/Cargo.toml"; then
     excluded='"patched"'
     case $clone in "$project"/*) excluded="\"${clone#"$project"/}\", $excluded" ;; esac
-    # From a virtual root: the first member that uses rapier, because such a root has no dependencies.
-    if [ "$member" = "$project" ] && ! has_table package "$project/Cargo.toml"; then
-        manifest="$(manifests | tr '\n' '\0' | xargs -0 grep -lE '^(\[.*dependencies\.)?(bevy_)?rapier[23]d' | head -1)" || true
-        member="${manifest%/Cargo.toml}"
-    else
-        manifest="$member/Cargo.toml"
-    fi
     cat <<TEXT
 Add to $project/Cargo.toml, the root of the workspace, unless it has them:
 
@@ -169,19 +250,24 @@ Add to $project/Cargo.toml, the root of the workspace, unless it has them:
     exclude = [$excluded]
 
 $patch_lines
-
-Add to ${manifest:-the Cargo.toml of the member that uses rapier}:
-
-    [dependencies]
-$(lines_for "${member:-$project}")
 TEXT
-    [ -n "$member" ] || echo "    # A path that begins with no / is relative to the root: put ../ before it for each folder between."
+    users="$(users)"
+    while read -r manifest; do
+        [ -n "$manifest" ] || continue
+        printf '\nAdd to %s:\n\n    [dependencies]\n' "$manifest"
+        lines_for "${manifest%/Cargo.toml}" $(crates_of "$manifest")
+    done <<<"$users"
+    if [ -z "$users" ]; then
+        printf '\nAdd to the Cargo.toml of each member that uses rapier:\n\n    [dependencies]\n'
+        lines_for "$project" $crates
+        echo "    # A path that begins with no / is relative to the root: put ../ before it for each folder between."
+    fi
 else
     cat <<TEXT
 Add to $project/Cargo.toml, unless it has them:
 
     [dependencies]
-$(lines_for "$project")
+$(lines_for "$project" $crates)
 
 $patch_lines
 TEXT

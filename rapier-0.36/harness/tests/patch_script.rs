@@ -81,6 +81,8 @@ impl Drop for Project {
     }
 }
 
+const RAPIER: &str = "[dependencies]\nrapier3d = \"0.36\"\n";
+
 fn package(name: &str) -> String {
     format!("[package]\nname = \"{name}\"\nversion = \"0.0.0\"\n")
 }
@@ -97,10 +99,15 @@ fn locked_crate(name: &str, version: &str) -> String {
 fn an_error_says_what_is_wrong_and_leaves_no_copy() {
     let mut project = Project::new("errors");
     project.fails_with("no Cargo.toml in '.'", &[]);
-    project.write("Cargo.toml", "");
+    project.write("src/lib.rs", "");
+    project.write("Cargo.toml", "package");
+    project.fails_with("mend the manifest, or name rapier's crate by --crate: error: ", &[]);
+    project.write("Cargo.toml", &(package("plain") + RAPIER));
     project.fails_with("unknown option '--fast'", &["--fast", "."]);
+    project.fails_with("'--undo' after the folder '.': options go before it", &[".", "--undo"]);
     project.write("Cargo.lock", &locked("0.30.0"));
     project.fails_with("Cargo.lock has rapier3d 0.30.0; the patch is for 0.36.1", &[]);
+    project.fails_with("run 'cargo update -p rapier3d --precise 0.36.1'", &["--crate", "rapier3d"]);
     fs::remove_file(project.folder().join("Cargo.lock")).expect("removed");
     project.clone_into(&project.work.join("old"));
     let patch = project.work.join("old/patches/rapier3d+0.36.1.patch");
@@ -111,6 +118,82 @@ fn an_error_says_what_is_wrong_and_leaves_no_copy() {
     project.fails_with("the patch rapier3d+0.36.1.patch does not apply", &[]);
     fs::remove_file(&patch).expect("removed");
     project.fails_with("run the script from a copy of pbig's repository", &[]);
+}
+
+#[test]
+fn another_version_of_rapier_is_refused_and_so_is_none() {
+    let project = Project::new("versions");
+    project.write("src/lib.rs", "");
+    let uses = |line: &str| project.write("Cargo.toml", &(package("plain") + "[dependencies]\n" + line));
+    for (line, words) in [
+        ("rapier2d = \"0.35\"", "Cargo.toml asks for rapier2d ^0.35; the patch is for 0.36.1"),
+        ("rapier3d = \"0.27\"", "needs no patch: use pbig's crate rapier-pbig"),
+        ("r = { package = \"rapier3d\", version = \"=0.36.0\" }", "asks for rapier3d =0.36.0; the patch"),
+        (
+            "bevy_rapier2d = \"0.36\"",
+            "asks for bevy_rapier2d ^0.36; the patch is for 0.36.1 (bevy_rapier 0.37)",
+        ),
+        ("", "depends on rapier: run 'cargo add rapier3d@0.36.1'"),
+    ] {
+        uses(line);
+        project.fails_with(words, &[]);
+    }
+    for line in [
+        "rapier3d = \"0.36.1\"",
+        "rapier3d = \"=0.36\"",
+        "rapier3d = \"0.36.0\"",
+        "rapier3d = \">=0.30, <1\"",
+    ] {
+        uses(line);
+        project.run(&[]).expect(line);
+        assert!(project.copy().exists(), "{line}");
+        project.run(&["--undo"]).expect("success");
+    }
+}
+
+#[test]
+fn every_member_that_uses_rapier_is_named_with_its_lines() {
+    let project = Project::new("members");
+    project.write(
+        "Cargo.toml",
+        "[workspace]\nmembers = [\"crates/*\"]\n[workspace.dependencies]\nrapier2d = \"0.36\"\n",
+    );
+    for (name, dependencies) in [
+        ("both", "rapier2d.workspace = true\nrapier3d = \"0.36\"\n"),
+        ("none", ""),
+        ("old", "rapier3d = \"0.27\"\n"),
+        ("tests", ""),
+    ] {
+        let tests = if name == "tests" { "[dev-dependencies]\nrapier2d = \"0.36\"\n" } else { "" };
+        project.write(&format!("crates/{name}/src/lib.rs"), "");
+        project.write(
+            &format!("crates/{name}/Cargo.toml"),
+            &(package(name) + tests + "[dependencies]\n" + dependencies),
+        );
+    }
+    let line = |name: &str| {
+        format!("    {name}-pbig = {{ path = \"{}/rapier-0.36/{name}-pbig\" }}\n", root().display())
+    };
+    let add = |member: &str| format!("\nAdd to PROJECT/crates/{member}/Cargo.toml:\n\n    [dependencies]\n");
+    let blocks = add("both") + &line("rapier2d") + &line("rapier3d") + &add("tests") + &line("rapier2d");
+    for folder in [".", "crates/none"] {
+        project.prints(&blocks, &[folder]);
+        let printed = project.run(&[folder]).expect("success");
+        assert!(!printed.contains("crates/old") && !printed.contains("crates/none"), "{printed}");
+    }
+    project
+        .write("crates/tests/Cargo.toml", &(package("tests") + "[dependencies]\n\nrapier2d-pbig = \"1\"\n"));
+    let wanted = "\nPROJECT/crates/tests/Cargo.toml:6:rapier2d-pbig = \"1\"\n";
+    project.prints(wanted, &["--undo", "crates/none"]);
+}
+
+#[test]
+fn help_lists_every_option() {
+    let printed = Project::new("help").run(&["--help"]).expect("success");
+    for option in ["[PROJECT]", "--crate NAME", "--edge-lookup", "--undo", "--help"] {
+        assert!(printed.contains(&format!("    patch-rapier.sh {option}")), "{option}: {printed}");
+    }
+    assert!(!printed.contains("#!") && !printed.contains("set -"), "{printed}");
 }
 
 #[test]
@@ -151,7 +234,7 @@ Add to PROJECT/crates/app/Cargo.toml:
 #[test]
 fn it_prints_the_lines_for_each_manifest() {
     let mut project = Project::new("lines");
-    project.write("Cargo.toml", &package("plain"));
+    project.write("Cargo.toml", &(package("plain") + RAPIER));
     project.write("src/lib.rs", "");
     project.prints(&format!("path = \"{}/rapier-0.36/rapier3d-pbig\"", root().display()), &[]);
     project.clone_into(&project.folder().join("third party/pbig"));
@@ -159,15 +242,17 @@ fn it_prints_the_lines_for_each_manifest() {
     // A virtual workspace, named by its member and by its root.
     fs::remove_dir_all(project.folder().join("src")).expect("removed");
     project.write("Cargo.toml", "[workspace]\nmembers = [\"crates/app\"]\n");
-    project.write("crates/app/Cargo.toml", &(package("app") + "[dependencies]\nrapier3d = \"0.36\"\n"));
+    project.write("crates/app/Cargo.toml", &(package("app") + RAPIER));
     project.write("crates/app/src/lib.rs", "");
     project.prints(IN_A_WORKSPACE, &["crates/app"]);
     assert!(project.copy().exists() && !project.folder().join("crates/app/patched").exists());
     project.prints(IN_A_WORKSPACE, &[]);
     project.write("crates/app/Cargo.toml", &package("app"));
-    project.prints("Add to the Cargo.toml of the member that uses rapier:", &[]);
+    // Another crate may bring rapier.
+    project.prints("Add to the Cargo.toml of each member that uses rapier:", &["--crate", "rapier3d"]);
     // A root that is a package as well.
-    project.write("Cargo.toml", &(package("top") + "[lib]\npath = \"crates/app/src/lib.rs\"\n[workspace]\n"));
+    let top = package("top") + "[lib]\npath = \"crates/app/src/lib.rs\"\n[workspace]\n";
+    project.write("Cargo.toml", &(top + RAPIER));
     project.prints("Add to PROJECT/Cargo.toml:\n\n    [dependencies]\n", &[]);
 }
 
