@@ -3,8 +3,9 @@
 use crate::options::{check_output, plan_text, print_summary, with_threads};
 use crate::pairs::{Args, repeated};
 use pbig_core::{Finder, Report};
-use pbig_harness::files::{BOXES_OR_PAIRS, Location, ending, is_stdout, write_csv, write_id_pairs};
+use pbig_harness::files::{BOXES_OR_PAIRS, Location, counted, ending, is_stdout, write_csv, write_id_pairs};
 use pbig_harness::mesh::{Elements, Mesh, MeshElements};
+use pbig_harness::output::warn;
 use pbig_harness::prelude::*;
 use std::path::Path;
 
@@ -22,13 +23,13 @@ pub(crate) fn kinds(text: &str) -> Result<Kinds, String> {
 impl Kinds {
     /// Returns the elements of both kinds; one list if the kinds are the same.
     fn of<'a>(&self, elements: &'a MeshElements) -> (&'a Elements, Option<&'a Elements>) {
-        let of_kind = |kind: &str| match kind {
-            "v" => &elements.vertices,
-            "e" => &elements.edges,
-            _ => &elements.faces,
-        };
-        let (a, b) = self.0.split_at(1);
-        (of_kind(a), (a != b).then(|| of_kind(b)))
+        let [a, b] = self.both();
+        (elements.of(a), (a != b).then(|| elements.of(b)))
+    }
+
+    fn both(&self) -> [char; 2] {
+        let mut kinds = self.0.chars();
+        [kinds.next(), kinds.next()].map(|kind| kind.expect("two, as parsed"))
     }
 }
 
@@ -52,6 +53,7 @@ pub(crate) fn run(args: &Args, path: &Path) -> Result<(), Failure> {
         frames.iter().try_for_each(refuse_invalid)?;
     }
     let elements = elements(&frames)?;
+    warn_of_none(args, path, &elements);
     let find_all = || args.elements.iter().map(|kinds| find(args, path, kinds, &elements)).collect();
     let all: Vec<Found> = with_threads(args.threads, find_all)?;
     if let Some(output) = &args.output {
@@ -65,6 +67,17 @@ fn elements(frames: &[Frame<'_>]) -> Result<MeshElements, Failure> {
     let elements = frames[0].1.elements(frames.get(1).map(|(_, mesh)| mesh));
     let next = frames[frames.len() - 1].0.display();
     elements.map_err(|what| Failure::Input(format!("{next}: {what}")))
+}
+
+/// Warns of kinds that the mesh has none of: a search that cannot find a pair is seldom wanted.
+fn warn_of_none(args: &Args, path: &Path, elements: &MeshElements) {
+    for Kinds(kinds) in &args.elements {
+        for (kind, name) in [('v', "vertices"), ('e', "edges"), ('f', "faces")] {
+            if kinds.contains(kind) && elements.of(kind).boxes.is_empty() {
+                warn(&format!("{}: the mesh has no {name}, and {kinds} no pairs", path.display()));
+            }
+        }
+    }
 }
 
 /// Refuses a vertex that is not a number in a frame.
@@ -165,20 +178,44 @@ fn report(args: &Args, frames: &[Frame<'_>], elements: &MeshElements, all: &[Fou
     let line = |found: &Found| {
         let (kinds, pairs, ms) = (&found.kinds.0, found.report.pairs, &found.ms);
         let (invalid, plan) = (invalid_text(found, elements), plan_text(&found.report));
-        format!("\n{kinds}: {pairs} candidate pairs without a common vertex ({invalid})\n{ms}\n{plan}")
+        let pairs = counted(pairs as usize, "candidate pair", "candidate pairs");
+        format!("\n{kinds}: {pairs} without a common vertex ({invalid})\n{ms}\n{plan}")
     };
     let lines: String = all.iter().map(line).collect();
     let notes: String = notes.iter().map(|note| format!("\n{note}")).collect();
-    let summary = format!("{vertices} vertices, {edges} edges ({rods} rods), {faces} faces{notes}{lines}");
+    let vertices = counted(vertices, "vertex", "vertices");
+    let (edges, rods) = (counted(edges, "edge", "edges"), counted(rods, "rod", "rods"));
+    let faces = counted(faces, "face", "faces");
+    let summary = format!("{vertices}, {edges} ({rods}), {faces}{notes}{lines}");
     print_summary(args.output.as_deref(), &summary)
 }
 
-/// Says how many elements are invalid, and which is the first.
+/// Number of invalid elements that a summary names.
+const MOST_NAMED: usize = 3;
+
+/// Says how many elements are invalid, and names the first.
 fn invalid_text(found: &Found, elements: &MeshElements) -> String {
-    let (a, b) = found.kinds.of(elements);
-    let first = [Some(a), b].into_iter().flatten().zip(found.kinds.0.chars()).find_map(|(list, kind)| {
-        let element = list.boxes.iter().position(|aabb| !aabb.is_valid())?;
-        Some(format!(", the first is {kind} {element}"))
-    });
-    format!("{} elements invalid{}", found.report.invalid, first.unwrap_or_default())
+    let names = invalid_names(found, elements);
+    let invalid = counted(found.report.invalid as usize, "element", "elements");
+    if names.is_empty() {
+        format!("{invalid} invalid")
+    } else {
+        format!("{invalid} invalid: {}", names.join(", "))
+    }
+}
+
+/// Returns the first invalid elements, such as `f 0`, with `...` if there are more.
+fn invalid_names(found: &Found, elements: &MeshElements) -> Vec<String> {
+    let [a, b] = found.kinds.both();
+    let mut kinds = vec![a, b];
+    kinds.dedup();
+    let of_kind = |kind: char| {
+        let boxes = elements.of(kind).boxes.iter().enumerate();
+        boxes.filter(|(_, aabb)| !aabb.is_valid()).map(move |(element, _)| format!("{kind} {element}"))
+    };
+    let mut names: Vec<String> = kinds.into_iter().flat_map(of_kind).take(MOST_NAMED + 1).collect();
+    if let Some(last) = names.get_mut(MOST_NAMED) {
+        *last = "...".into();
+    }
+    names
 }

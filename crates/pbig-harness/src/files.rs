@@ -31,6 +31,11 @@ pub(crate) fn one_line(what: impl fmt::Display) -> String {
     what.to_string().replace(['\n', '\r'], " ")
 }
 
+/// Returns a number and its noun: `1 vertex`, `2 vertices`.
+pub fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
 /// Returns the beginning of a value in a file, short enough that a message can also say what was expected.
 pub(crate) fn brief(text: &str) -> String {
     const LONGEST: usize = 120;

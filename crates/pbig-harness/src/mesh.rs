@@ -6,8 +6,10 @@ mod reading;
 #[cfg(test)]
 mod tests_of_files;
 
-use crate::files::Location;
+use crate::files::{Location, counted};
 use pbig_core::{Aabb, Boxes, Keys, NO_KEY};
+use reading::Oddity;
+use std::collections::BTreeMap;
 
 /// The endings of a file with a mesh.
 pub const MESHES: [&str; 2] = ["ply", "obj"];
@@ -25,10 +27,8 @@ pub struct Mesh {
     pub first_number: usize,
     /// The first vertex that has a NaN: its index and its place in the file.
     pub first_invalid: Option<(usize, Location)>,
-    /// Number of faces that name a vertex twice, and the place of the first.
-    doubled: Option<(usize, Location)>,
-    /// Number of rods from a vertex to itself, which are left out, and the place of the first.
-    dropped: Option<(usize, Location)>,
+    /// By oddity: how many there are, and the place of the first.
+    oddities: BTreeMap<Oddity, (usize, Location)>,
     /// Names of what the file has and a mesh has not.
     skipped: Vec<String>,
 }
@@ -73,6 +73,17 @@ pub struct MeshElements {
     pub faces: Elements,
 }
 
+impl MeshElements {
+    /// Returns the vertices (`v`), edges (`e`) or, for any other kind, faces.
+    pub fn of(&self, kind: char) -> &Elements {
+        match kind {
+            'v' => &self.vertices,
+            'e' => &self.edges,
+            _ => &self.faces,
+        }
+    }
+}
+
 impl Mesh {
     /// Returns the edges, each once: larger and then smaller vertex, sorted. A rod is an edge; a vertex has none to itself.
     pub fn edges(&self) -> Vec<[u32; 2]> {
@@ -103,7 +114,11 @@ impl Mesh {
     fn difference(&self, next: &Self) -> Option<String> {
         let counts = [next.vertices.len(), self.vertices.len()];
         if counts[0] != counts[1] {
-            return Some(format!("it has {} vertices, the other {}", counts[0], counts[1]));
+            return Some(format!(
+                "it has {}, the other {}",
+                counted(counts[0], "vertex", "vertices"),
+                counts[1]
+            ));
         }
         if next.faces.is_empty() && next.rods.is_empty() {
             return None;
@@ -133,7 +148,8 @@ fn difference<T: AsRef<[u32]> + PartialEq>(
     before: &[T],
 ) -> Option<String> {
     if now.len() != before.len() {
-        return Some(format!("it has {} {what}s, the other {}", now.len(), before.len()));
+        let now = counted(now.len(), what, &format!("{what}s"));
+        return Some(format!("it has {now}, the other {}", before.len()));
     }
     let i = now.iter().zip(before).position(|(now, before)| now != before)?;
     let numbers = |list: &T, first: usize| {

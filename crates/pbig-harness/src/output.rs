@@ -64,6 +64,11 @@ pub fn print_aside(text: &str) {
     _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
+/// Prints a warning to stderr.
+pub fn warn(what: &str) {
+    print_aside(&format!("pbig: warning: {}", what.replace(char::is_control, " ")));
+}
+
 /// Ends a program: an error is one line on stderr.
 pub fn finish(program: &str, result: Result<(), Failure>) -> ExitCode {
     let Err(failure) = result else { return ExitCode::SUCCESS };

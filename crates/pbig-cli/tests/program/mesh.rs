@@ -126,8 +126,8 @@ fn what_is_odd_or_not_read_is_told() {
         assert!(told.iter().all(|note| text.contains(&format!("\n{note}\n"))), "{text}");
     }
     let (text, _) = read(folder.path(), "a.obj", format!("{nan}f 1 2 3\n"));
-    assert!(text.contains("vertex (2 elements invalid, the first is e 0)"), "{text}");
-    assert!(text.contains("vertex (2 elements invalid, the first is v 1)"), "{text}");
+    assert!(text.contains("vertex (2 elements invalid: e 0, e 2)"), "{text}");
+    assert!(text.contains("vertex (2 elements invalid: v 1, f 0)"), "{text}");
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn frames_of_different_meshes_say_where_they_differ() {
     };
     let other = "pbig: turned.obj: not a frame of the same mesh: its face 1 (counted from 0) has the vertices 1 4 3, the other's 2 4 3";
     assert_eq!(refused(&next("turned.obj", &[]), &[]), other);
-    refused(&next("less.obj", &[]), &["less.obj: not a frame of the same mesh: it has 1 faces, the other 2"]);
+    refused(&next("less.obj", &[]), &["less.obj: not a frame of the same mesh: it has 1 face, the other 2"]);
     assert_eq!(counts(&json(&next("vertices.obj", &["--json"]))), [4, 5, 0, 2]);
     write("nan.obj", &quad.replace("1 1 0", "1 1 nan"));
     let strict = "nan.obj: line 4: vertex 4 (counted from 1) has a NaN; mend it, or leave out --strict";

@@ -88,6 +88,35 @@ fn pairs_of_a_mesh_leave_out_neighbours() {
 }
 
 #[test]
+fn a_mesh_tells_what_it_lacks_and_which_elements_are_invalid() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    let run = |name: &str, kinds: &str| {
+        let output = pbig(here, &["pairs", "--mesh", name, "--elements", kinds]);
+        assert!(output.status.success());
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).expect("UTF-8"))
+    };
+    write(here, "point.obj", "v 0 0 0\n");
+    let [summary, warnings] = run("point.obj", "vf,vv");
+    assert!(
+        summary.starts_with("1 vertex, 0 edges (0 rods), 0 faces\npoint.obj: no faces and no rods\n"),
+        "{summary}"
+    );
+    assert_eq!(warnings, "pbig: warning: point.obj: the mesh has no faces, and vf no pairs\n");
+    let faces = "f 1 2 3\nf 2 3 4\nf 1 2 4\nf 1 3 4\n";
+    write(here, "nan.obj", &format!("v 0 0 0\nv nan 0 0\nv 0 nan 0\nv 0 0 1\n{faces}"));
+    let [summary, warnings] = run("nan.obj", "vf,vv,ff");
+    assert_eq!(warnings, "");
+    for line in [
+        "\nvf: 0 candidate pairs without a common vertex (6 elements invalid: v 1, v 2, f 0, ...)\n",
+        "\nvv: 0 candidate pairs without a common vertex (2 elements invalid: v 1, v 2)\n",
+        "\nff: 0 candidate pairs without a common vertex (4 elements invalid: f 0, f 1, f 2, ...)\n",
+    ] {
+        assert!(summary.contains(line), "{line}: {summary}");
+    }
+}
+
+#[test]
 fn a_wrong_mesh_or_option_is_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
@@ -103,6 +132,12 @@ fn a_wrong_mesh_or_option_is_refused_in_one_line() {
         &mesh("mesh.obj", &["--elements", "ee", "--next", "less.obj"]),
         &["less.obj: not a frame of the same mesh"],
     );
+    write(here, "four.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 9\n");
+    refused(
+        &mesh("four.obj", &["--elements", "ee"]),
+        &["pbig: four.obj: line 5: vertex 9 does not exist; the file has 4"],
+    );
+    refused(&pbig(here, &["pairs", "mesh.obj"]), &["this is a mesh; use --mesh mesh.obj"]);
     refused(&mesh("mesh.obj", &["--elements", "xx"]), &["--elements xx: must be two of v (vertex)"]);
     refused(&mesh("mesh.obj", &[]), &["--elements"]);
     refused(

@@ -165,6 +165,9 @@ fn csv_box(line: &str, is_first: bool) -> Result<Aabb, String> {
 
 fn values(line: &str) -> Result<Aabb, String> {
     let count = fields(line).count();
+    if count == 7 && line.ends_with(',') {
+        return Err("a comma follows the sixth value; remove the comma at the end of each line".into());
+    }
     if count != 6 {
         return Err(format!("expected 6 columns, separated by commas, found {count}"));
     }
@@ -204,6 +207,13 @@ mod tests {
         let rest = repeat(b'\xff');
         let read = boxes(BufReader::new(b"0,0,0,1,1,1\nx\n".chain(rest)), 9);
         assert_eq!(read.expect_err("refused"), "line 2: expected 6 columns, separated by commas, found 1");
+    }
+
+    #[test]
+    fn a_comma_at_the_end_is_explained() {
+        let wanted = "a comma follows the sixth value; remove the comma at the end of each line";
+        assert_eq!(error("0,0,0,1,1,1\n0,0,0,1,1,1, \r\n"), format!("line 2: {wanted}"));
+        assert_eq!(error("0,0,0,1,1,1,1\n"), "line 1: expected 6 columns, separated by commas, found 7");
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 use super::Mesh;
 use super::reading::{MAX_LINE_BYTES, number};
-use crate::files::{Lines, Location, brief, too_long};
+use crate::files::{Lines, Location, brief, counted, too_long};
 use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::str::SplitWhitespace;
@@ -54,8 +54,8 @@ struct Reading {
     mesh: Mesh,
     /// Number of the present line; of the first, if it goes on in others.
     line: usize,
-    /// The largest vertex that a line names, and that line. A later line may define it.
-    furthest: (i64, usize),
+    /// Vertices that a later line may define, each larger than those before, and the lines that name them.
+    awaited: Vec<(i64, usize)>,
     /// Words at the beginning of lines that are skipped, with the number of these lines.
     skipped: BTreeMap<String, usize>,
     /// The first of these words.
@@ -109,18 +109,18 @@ impl Reading {
 
     /// Returns the vertex of `vertex/texture/normal`: counted from 1, or backwards from the last one with -1.
     fn index(&mut self, word: &str) -> Result<u32, String> {
-        let number = word.split('/').next().and_then(|vertex| vertex.parse::<i64>().ok());
-        let number = number.ok_or_else(|| format!("'{}' is not the number of a vertex", brief(word)))?;
+        let number = vertex_number(word).ok_or_else(|| not_a_vertex(word))?;
         let before = self.mesh.vertices.len() as i64;
         let from_start = if number < 0 { before.saturating_add(number) + 1 } else { number };
         if number == 0 {
             return Err("vertex 0 does not exist; the first is 1".into());
         }
         if from_start < 1 {
-            return Err(format!("vertex {number} does not exist; the lines before have {before} vertices"));
+            let before = counted(self.mesh.vertices.len(), "vertex", "vertices");
+            return Err(format!("vertex {number} does not exist; the lines before have {before}"));
         }
-        if from_start > self.furthest.0 {
-            self.furthest = (from_start, self.line);
+        if from_start > self.awaited.last().map_or(before, |(largest, _)| before.max(*largest)) {
+            self.awaited.push((from_start, self.line));
         }
         // A larger one does not exist, which is told at the end.
         Ok(u32::try_from(from_start - 1).unwrap_or(u32::MAX))
@@ -132,15 +132,27 @@ impl Reading {
             let found = self.first_skipped.map_or(String::new(), |word| format!(", found '{word}'"));
             return Err(format!("no vertices; expected lines that begin with `v`{found}"));
         }
-        if let (number, line) = self.furthest
-            && number > vertices as i64
-        {
+        if let Some((number, line)) = self.awaited.iter().find(|(number, _)| *number > vertices as i64) {
             return Err(format!("line {line}: vertex {number} does not exist; the file has {vertices}"));
         }
         let names = self.skipped.iter().map(|(word, lines)| format!("{word} ({lines})"));
         self.mesh.skip(&names.collect::<Vec<_>>(), "");
         Ok(self.mesh)
     }
+}
+
+/// Returns the vertex of `vertex`, `vertex/texture`, `vertex//normal` or `vertex/texture/normal`.
+fn vertex_number(word: &str) -> Option<i64> {
+    let mut parts = word.split('/');
+    let vertex = parts.next()?.parse().ok();
+    let others: Vec<&str> = parts.collect();
+    let are_numbers = others.iter().all(|part| part.is_empty() || part.parse::<i64>().is_ok());
+    vertex.filter(|_| others.len() < 3 && are_numbers)
+}
+
+fn not_a_vertex(word: &str) -> String {
+    let form = if word.contains('/') { "; expected numbers: vertex/texture/normal" } else { "" };
+    format!("'{}' is not the number of a vertex{form}", brief(word))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ mod body;
 mod header;
 
 use super::Mesh;
-use super::reading::MAX_LINE_BYTES;
+use super::reading::{MAX_LINE_BYTES, Oddity};
 use crate::files::{Lines, brief, one_line};
 use body::Body;
 use header::{Element, Format};
@@ -26,7 +26,8 @@ pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
         Format::Binary { is_big } => Body::Binary { reader: lines.into_rest().map_err(one_line)?, is_big },
     };
     let vertices = header.elements.iter().find(|element| element.name.eq_ignore_ascii_case("vertex"));
-    let vertices = vertices.ok_or("no element vertex in the header")?.rows;
+    let vertices =
+        vertices.ok_or_else(|| format!("line {}: the header has no element vertex", header.end))?.rows;
     let mut rows = Rows { body, mesh: Mesh::default(), vertices };
     header.elements.iter().filter(|element| element.rows > 0).try_for_each(|element| rows.add(element))?;
     rows.mesh.skip(&rows.body.rest()?, "");
@@ -97,18 +98,24 @@ impl<R: BufRead> Rows<R> {
     fn add_strips(&mut self, element: &Element) -> Result<(), String> {
         let column = [element.column(&CORNERS, true)?];
         self.mesh.skip(&element.names_without(&column), " of element tristrips");
-        let (faces, vertices) = (&mut self.mesh.faces, self.vertices);
+        let vertices = self.vertices;
         for row in 0..element.rows {
-            let mut strip = [NO_KEY; 3];
-            self.body.row(element, row, &column, |_, value| {
-                let is_end = value == -1.0 || value == f64::from(u32::MAX);
-                strip = if is_end { [NO_KEY; 3] } else { [strip[1], strip[2], index(value, vertices)?] };
+            let (mut strip, mut length, mut short) = ([NO_KEY; 3], 0, 0);
+            let place = self.body.row(element, row, &column, |_, value| {
+                if value == -1.0 || value == f64::from(u32::MAX) {
+                    short += u32::from(is_short(length));
+                    (strip, length) = ([NO_KEY; 3], 0);
+                    return Ok(());
+                }
+                (strip, length) = ([strip[1], strip[2], index(value, vertices)?], length + 1);
                 let [a, b, c] = strip;
                 if a != NO_KEY && a != b && b != c && c != a {
-                    faces.push([a, b, c, NO_KEY]);
+                    self.mesh.faces.push([a, b, c, NO_KEY]);
                 }
                 Ok(())
             })?;
+            (0..short + u32::from(is_short(length)))
+                .for_each(|_| self.mesh.notice(Oddity::ShortStrip, place));
         }
         Ok(())
     }
@@ -126,6 +133,11 @@ impl<R: BufRead> Rows<R> {
         }
         Ok(())
     }
+}
+
+/// Returns true for a strip that has vertices, but too few for a triangle.
+fn is_short(length: u64) -> bool {
+    (1..3).contains(&length)
 }
 
 /// Returns a vertex that exists.

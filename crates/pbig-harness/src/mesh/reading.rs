@@ -12,6 +12,26 @@ pub(super) const MAX_LINE_BYTES: usize = 64 << 20;
 /// Number of names that a list of skipped things shows.
 const MOST_NAMES: usize = 8;
 
+/// A thing that a mesh may have, but seldom has on purpose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Oddity {
+    Far,
+    DoubledVertex,
+    LoopRod,
+    ShortStrip,
+}
+
+impl Oddity {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Far => "vertices beyond the range of f32, with infinite boxes",
+            Self::DoubledVertex => "faces that name a vertex twice",
+            Self::LoopRod => "rods from a vertex to itself, left out",
+            Self::ShortStrip => "strips of fewer than 3 vertices, without a triangle",
+        }
+    }
+}
+
 impl Mesh {
     /// Reads a `.ply` or `.obj` file.
     ///
@@ -46,23 +66,30 @@ impl Mesh {
             let number = vertex + self.first_number;
             format!("vertices with a NaN: {all}, the first is vertex {number} in {place}")
         });
-        let twice = |what: &str, seen: Option<(usize, Location)>| {
-            seen.map(|(all, place)| format!("{what}: {all}, the first in {place}"))
-        };
-        let doubled = twice("faces that name a vertex twice", self.doubled);
-        let dropped = twice("rods from a vertex to itself, left out", self.dropped);
+        let odd = self
+            .oddities
+            .iter()
+            .map(|(oddity, (all, place))| format!("{}: {all}, the first in {place}", oddity.name()));
         let empty = match (self.faces.is_empty(), self.rods.is_empty()) {
             (true, true) => Some("no faces and no rods".to_owned()),
             (true, false) => Some("no faces; rods have edges and vertices".to_owned()),
             _ => None,
         };
         let skipped = (!self.skipped.is_empty()).then(|| format!("not read: {}", self.skipped.join("; ")));
-        [invalid, doubled, dropped, empty, skipped].into_iter().flatten().collect()
+        invalid.into_iter().chain(odd).chain(empty).chain(skipped).collect()
+    }
+
+    /// Counts something that a mesh seldom has on purpose.
+    pub(super) fn notice(&mut self, oddity: Oddity, place: Location) {
+        self.oddities.entry(oddity).or_insert((0, place)).0 += 1;
     }
 
     pub(super) fn add_vertex(&mut self, at: [f64; 3], place: Location) {
         if self.first_invalid.is_none() && at.iter().any(|x| x.is_nan()) {
             self.first_invalid = Some((self.vertices.len(), place));
+        }
+        if at.iter().any(|x| x.abs() > f64::from(f32::MAX)) {
+            self.notice(Oddity::Far, place);
         }
         self.vertices.push(at);
     }
@@ -82,7 +109,7 @@ impl Mesh {
             }
         };
         if corners.iter().enumerate().any(|(i, corner)| corners[..i].contains(corner)) {
-            count(&mut self.doubled, place);
+            self.notice(Oddity::DoubledVertex, place);
         }
         self.faces.push(face);
         Ok(())
@@ -90,7 +117,7 @@ impl Mesh {
 
     pub(super) fn add_rod(&mut self, ends: [u32; 2], place: Location) {
         match ends[0] == ends[1] {
-            true => count(&mut self.dropped, place),
+            true => self.notice(Oddity::LoopRod, place),
             false => self.rods.push(ends),
         }
     }
@@ -101,11 +128,6 @@ impl Mesh {
             self.skipped.push(format!("{}{group}", list(names)));
         }
     }
-}
-
-fn count(seen: &mut Option<(usize, Location)>, place: Location) {
-    let (all, first) = seen.unwrap_or((0, place));
-    *seen = Some((all + 1, first));
 }
 
 /// Returns the first names, and how many there are more.

@@ -126,6 +126,26 @@ fn rods_of_obj_are_the_parts_of_a_line() {
 }
 
 #[test]
+fn oddities_are_counted_and_the_first_is_named() {
+    let mesh =
+        read("a.obj", b"v 0 0 0\nv 1e39 0 0\nv 0 -inf nan\nf 1 1 2\nf 1 2 3\nf 3 2 3\n").expect("a mesh");
+    let told = [
+        "vertices with a NaN: 1, the first is vertex 3 in line 3",
+        "vertices beyond the range of f32, with infinite boxes: 2, the first in line 2",
+        "faces that name a vertex twice: 2, the first in line 4",
+    ];
+    assert_eq!(mesh.notes(), told);
+    let head = HEAD.replace("face 1", "tristrips 3");
+    let rows = "0 0 0 9\n".repeat(3) + "4 -1 0 1 2\n7 0 1 -1 2 -1 0 1\n4 0 1 2 -1\n";
+    let mesh = read("a.ply", (head + &rows).as_bytes()).expect("a mesh");
+    assert_eq!(mesh.faces.len(), 2);
+    assert_eq!(
+        mesh.notes()[0],
+        "strips of fewer than 3 vertices, without a triangle: 3, the first in line 15"
+    );
+}
+
+#[test]
 fn a_long_list_of_what_is_not_read_is_cut() {
     let lines: String = (0..100).map(|i| format!("word{i}\u{7} 1\n")).collect();
     let notes = read("a.obj", format!("v 0 0 0\n{lines}").as_bytes()).expect("a vertex").notes();
@@ -174,10 +194,10 @@ fn errors_say_what_is_wrong_and_where() {
             read("a.ply", &far).expect_err("a negative vertex"),
             "element face, row 0, counted from 0: vertex -2147483646 does not exist; the file has 3, counted from 0",
         ),
-        (head("element vertex", "element point"), "no element vertex in the header"),
-        (head("float z", "float w"), "element vertex has no number z"),
-        (head("double y", "double x"), "element vertex has more than one number x"),
-        (head("float z", "list uchar float z"), "element vertex has no number z"),
+        (head("element vertex", "element point"), "line 10: the header has no element vertex"),
+        (head("float z", "float w"), "line 3: element vertex has no number z"),
+        (head("double y", "double x"), "line 3: element vertex has more than one number x"),
+        (head("float z", "list uchar float z"), "line 3: element vertex has no number z"),
         (head("vertex_indices", "corners"), "the file ends after 0 of 3 rows of element vertex"),
         (
             head("float x", "flaot x"),
@@ -209,7 +229,17 @@ fn errors_say_what_is_wrong_and_where() {
         (obj("v 0 0 0\nf 1 1 0\n"), "line 2: vertex 0 does not exist; the first is 1"),
         (
             obj("v 0 0 0\nf 1 1 -2\nv 0 0 0\n"),
-            "line 2: vertex -2 does not exist; the lines before have 1 vertices",
+            "line 2: vertex -2 does not exist; the lines before have 1 vertex",
+        ),
+        // The first that is wrong, not the largest.
+        (obj("v 0 0 0\nf 1 2 3\nf 1 1 9\nv 0 0 0\n"), "line 2: vertex 3 does not exist; the file has 2"),
+        (
+            obj("v 0 0 0\nf 1 1/x 1\n"),
+            "line 2: '1/x' is not the number of a vertex; expected numbers: vertex/texture/normal",
+        ),
+        (
+            obj("v 0 0 0\nl 1/1/1/1 1\n"),
+            "line 2: '1/1/1/1' is not the number of a vertex; expected numbers: vertex/texture/normal",
         ),
         (obj("v 0 0 0\nf 1 \\\n1\n"), "line 2: expected a face of 3 or 4 vertices, found 2"),
         (obj("v 0 0 0\nl 1\n"), "line 2: expected a rod of 2 vertices or more, found 1"),

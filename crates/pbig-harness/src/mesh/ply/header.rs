@@ -4,6 +4,8 @@ use crate::files::{Lines, Location, brief};
 use std::io::BufRead;
 
 pub(super) struct Header {
+    /// Number of the last line.
+    pub(super) end: usize,
     pub(super) format: Format,
     pub(super) elements: Vec<Element>,
 }
@@ -15,6 +17,8 @@ pub(super) enum Format {
 
 /// A kind of rows.
 pub(super) struct Element {
+    /// Number of its line in the header.
+    line: usize,
     pub(super) name: String,
     pub(super) rows: u64,
     pub(super) properties: Vec<Property>,
@@ -46,8 +50,11 @@ impl Element {
         let what = if is_list { "list" } else { "number" };
         match (found.next(), found.next()) {
             (Some((column, _)), None) => Ok(column),
-            (None, _) => Err(format!("element {} has no {what} {}", self.name, names[0])),
-            _ => Err(format!("element {} has more than one {what} {}", self.name, names[0])),
+            (None, _) => Err(format!("line {}: element {} has no {what} {}", self.line, self.name, names[0])),
+            _ => Err(format!(
+                "line {}: element {} has more than one {what} {}",
+                self.line, self.name, names[0]
+            )),
         }
     }
 
@@ -80,7 +87,9 @@ pub(super) fn read(lines: &mut Lines<impl BufRead>) -> Result<Header, String> {
             [] | ["comment" | "obj_info", ..] => {}
             ["format", ..] if format.is_some() => return Err(at("a second line `format`".into())),
             ["format", name, ..] => format = Some(format_of(name).map_err(at)?),
-            ["element", name, rows] => add(name, rows, &mut elements).map_err(at)?,
+            ["element", name, rows] => {
+                elements.push(element(lines.number, name, rows, &elements).map_err(at)?)
+            }
             ["property", ref rest @ ..] => {
                 let element: Option<&mut Element> = elements.last_mut();
                 let element = element.ok_or_else(|| at("a property before the first element".into()))?;
@@ -88,7 +97,7 @@ pub(super) fn read(lines: &mut Lines<impl BufRead>) -> Result<Header, String> {
             }
             ["end_header"] => {
                 let format = format.ok_or_else(|| at("no line `format ascii 1.0` before it".into()))?;
-                return Ok(Header { format, elements });
+                return Ok(Header { end: lines.number, format, elements });
             }
             _ => {
                 let known = "`format NAME`, `element NAME ROWS`, `property TYPE NAME` or `end_header`";
@@ -109,14 +118,13 @@ fn format_of(name: &str) -> Result<Format, String> {
     }
 }
 
-fn add(name: &str, rows: &str, elements: &mut Vec<Element>) -> Result<(), String> {
+fn element(line: usize, name: &str, rows: &str, before: &[Element]) -> Result<Element, String> {
     let name = brief(name);
-    if elements.iter().any(|element| element.name.eq_ignore_ascii_case(&name)) {
+    if before.iter().any(|element| element.name.eq_ignore_ascii_case(&name)) {
         return Err(format!("a second element {name}"));
     }
     let wrong = |_| format!("'{}' is not a number of rows", brief(rows));
-    elements.push(Element { name, rows: rows.parse().map_err(wrong)?, properties: vec![] });
-    Ok(())
+    Ok(Element { line, name, rows: rows.parse().map_err(wrong)?, properties: vec![] })
 }
 
 fn property(words: &[&str]) -> Result<Property, String> {
