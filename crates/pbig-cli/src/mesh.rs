@@ -1,13 +1,13 @@
 //! `pbig pairs --mesh`: candidate pairs of the vertices, edges and faces of a mesh, without those that share a vertex.
 
-use crate::options::{check_output, plan_text, print_summary, with_threads};
+use crate::options::{check_inputs, check_output, plan_text, print_summary, with_threads};
 use crate::pairs::{Args, repeated};
 use pbig_core::{Finder, Report};
-use pbig_harness::files::{BOXES_OR_PAIRS, Location, counted, ending, is_stdout, write_csv, write_id_pairs};
+use pbig_harness::files::{BOXES_OR_PAIRS, Location, counted, ending, name, write_csv, write_id_pairs};
 use pbig_harness::mesh::{Elements, Mesh, MeshElements};
 use pbig_harness::output::warn;
 use pbig_harness::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Two kinds of elements: `v` for vertices, `e` for edges or `f` for faces, twice.
 #[derive(Clone, Debug)]
@@ -45,19 +45,21 @@ struct Found {
 type Frame<'a> = (&'a Path, Mesh);
 
 pub(crate) fn run(args: &Args, path: &Path) -> Result<(), Failure> {
-    check_outputs(args, path)?;
-    let frames = [Some(path), args.next.as_deref()].into_iter().flatten();
-    let frames: Vec<Frame<'_>> =
-        frames.map(|path| Ok((path, Mesh::read(path)?))).collect::<Result<_, String>>()?;
+    let paths: Vec<&Path> = [Some(path), args.next.as_deref()].into_iter().flatten().collect();
+    let outputs = check_files(args, &paths)?;
+    let frames = paths.into_iter().map(|path| Ok((path, Mesh::read(path)?)));
+    let frames: Vec<Frame<'_>> = frames.collect::<Result<_, String>>()?;
     if args.strict {
         frames.iter().try_for_each(refuse_invalid)?;
     }
-    let elements = elements(&frames)?;
+    let mut elements = elements(&frames)?;
+    elements.grow(args.margin);
     warn_of_none(args, path, &elements);
     let find_all = || args.elements.iter().map(|kinds| find(args, path, kinds, &elements)).collect();
     let all: Vec<Found> = with_threads(args.threads, find_all)?;
-    if let Some(output) = &args.output {
-        write(output, &all)?;
+    write(&outputs, &all)?;
+    if let Some(table) = &args.edges {
+        write_id_pairs(table, elements.edges.keys.iter().map(|[a, b, ..]| [*b, *a]))?;
     }
     report(args, &frames, &elements, &all)
 }
@@ -65,16 +67,16 @@ pub(crate) fn run(args: &Args, path: &Path) -> Result<(), Failure> {
 /// Returns the elements of one frame, or of two.
 fn elements(frames: &[Frame<'_>]) -> Result<MeshElements, Failure> {
     let elements = frames[0].1.elements(frames.get(1).map(|(_, mesh)| mesh));
-    let next = frames[frames.len() - 1].0.display();
+    let next = name(frames[frames.len() - 1].0);
     elements.map_err(|what| Failure::Input(format!("{next}: {what}")))
 }
 
 /// Warns of kinds that the mesh has none of: a search that cannot find a pair is seldom wanted.
 fn warn_of_none(args: &Args, path: &Path, elements: &MeshElements) {
     for Kinds(kinds) in &args.elements {
-        for (kind, name) in [('v', "vertices"), ('e', "edges"), ('f', "faces")] {
+        for (kind, noun) in [('v', "vertices"), ('e', "edges"), ('f', "faces")] {
             if kinds.contains(kind) && elements.of(kind).boxes.is_empty() {
-                warn(&format!("{}: the mesh has no {name}, and {kinds} no pairs", path.display()));
+                warn(&format!("{}: the mesh has no {noun}, and {kinds} no pairs", name(path)));
             }
         }
     }
@@ -86,44 +88,51 @@ fn refuse_invalid((path, mesh): &Frame<'_>) -> Result<(), Failure> {
     let line = if let Location::Line(_) = place { format!("{place}: ") } else { String::new() };
     let (first, what) = (mesh.first_number, "has a NaN; mend it, or leave out --strict");
     let vertex = vertex + first;
-    Err(Failure::Input(format!("{}: {line}vertex {vertex} (counted from {first}) {what}", path.display())))
+    Err(Failure::Input(format!("{}: {line}vertex {vertex} (counted from {first}) {what}", name(path))))
 }
 
 /// Returns what the files have that a reader may not expect, a line each.
 fn notes(frames: &[Frame<'_>]) -> Vec<String> {
     let of_file = |(path, mesh): &Frame<'_>| {
-        let line = |note| format!("{}: {note}", path.display());
+        let line = |note| format!("{}: {note}", name(path));
         mesh.notes().into_iter().map(line).collect::<Vec<_>>()
     };
     frames.iter().flat_map(of_file).collect()
 }
 
-/// Checks the output before the work: `.npy` has no column for kinds.
-fn check_outputs(args: &Args, path: &Path) -> Result<(), Failure> {
-    for input in [Some(path), args.next.as_deref()].into_iter().flatten() {
-        check_output(args.output.as_deref(), &BOXES_OR_PAIRS, input, args.json)?;
-    }
-    match &args.output {
-        Some(output)
-            if has_kinds(&args.elements)
-                && !is_stdout(output)
-                && ending(output, &BOXES_OR_PAIRS)? == "npy" =>
-        {
-            let what = "a .npy holds pairs of one entry of --elements; use .csv";
-            Err(Failure::Input(format!("{}: {what}", output.display())))
+/// Checks inputs and outputs before the work, and returns the files for pairs: one, or one for each kind if a `.npy` is wanted,
+/// which has no column for kinds.
+fn check_files(args: &Args, inputs: &[&Path]) -> Result<Vec<PathBuf>, Failure> {
+    check_inputs(inputs)?;
+    let outputs = match &args.output {
+        Some(output) if args.elements.len() > 1 && ending(output, &["npy"]).is_ok() => {
+            args.elements.iter().map(|kinds| for_kinds(output, kinds)).collect()
         }
-        _ => Ok(()),
+        output => Vec::from_iter(output.clone()),
+    };
+    let of_pairs = outputs.iter().map(|output| ("-o", output));
+    for (option, output) in of_pairs.chain(args.edges.iter().map(|table| ("--edges", table))) {
+        let check = |input: &&Path| check_output(option, Some(output), &BOXES_OR_PAIRS, input, args.json);
+        inputs.iter().try_for_each(check)?;
+    }
+    match &args.edges {
+        Some(table) if outputs.contains(table) => {
+            Err(Failure::Input(format!("{}: -o and --edges name one file; name another", table.display())))
+        }
+        _ => Ok(outputs),
     }
 }
 
-/// Returns true if the output needs a column for the kinds of elements.
-fn has_kinds<T>(all: &[T]) -> bool {
-    all.len() > 1
+/// Returns the file for pairs of these kinds: `out-ee.npy` beside `out.npy`.
+fn for_kinds(output: &Path, Kinds(kinds): &Kinds) -> PathBuf {
+    let [stem, ending] =
+        [output.file_stem(), output.extension()].map(|part| part.unwrap_or_default().display());
+    output.with_file_name(format!("{stem}-{kinds}.{ending}"))
 }
 
 fn find(args: &Args, path: &Path, kinds: &Kinds, elements: &MeshElements) -> Result<Found, Failure> {
     let mut finder = args.backend.finder();
-    let subject = format!("{}: {}", path.display(), kinds.0);
+    let subject = format!("{}: {}", name(path), kinds.0);
     let times = repeated(args, &subject, || search(&mut finder, kinds.of(elements)))?;
     let pairs = finder.pairs().iter().map(|pair| [pair.a, pair.b]);
     let between = finder.pairs_between().iter().map(|pair| [pair.a, pair.b]);
@@ -138,14 +147,17 @@ fn search(finder: &mut Finder, (a, b): (&Elements, Option<&Elements>)) -> Result
     }
 }
 
-fn write(output: &Path, all: &[Found]) -> Result<(), String> {
-    let [one] = all else {
-        let lines = all
-            .iter()
-            .flat_map(|found| found.pairs.iter().map(|[a, b]| format!("{},{a},{b}", found.kinds.0)));
+/// Writes the pairs into a file for each kind, or all into one text.
+fn write(outputs: &[PathBuf], all: &[Found]) -> Result<(), String> {
+    if let ([output], true) = (outputs, all.len() > 1) {
+        let line = |kinds: &Kinds, [a, b]: &[u32; 2]| format!("{},{a},{b}", kinds.0);
+        let lines = all.iter().flat_map(|found| found.pairs.iter().map(move |pair| line(&found.kinds, pair)));
         return write_csv(output, "elements,a,b", lines);
-    };
-    write_id_pairs(output, one.pairs.iter().copied())
+    }
+    outputs
+        .iter()
+        .zip(all)
+        .try_for_each(|(output, found)| write_id_pairs(output, found.pairs.iter().copied()))
 }
 
 fn report(args: &Args, frames: &[Frame<'_>], elements: &MeshElements, all: &[Found]) -> Result<(), Failure> {
@@ -171,6 +183,7 @@ fn report(args: &Args, frames: &[Frame<'_>], elements: &MeshElements, all: &[Fou
             "rods": rods,
             "faces": faces,
             "notes": notes,
+            "margin": args.margin,
             "searches": searches,
         });
         return print(&object.to_string());
@@ -187,7 +200,7 @@ fn report(args: &Args, frames: &[Frame<'_>], elements: &MeshElements, all: &[Fou
     let (edges, rods) = (counted(edges, "edge", "edges"), counted(rods, "rod", "rods"));
     let faces = counted(faces, "face", "faces");
     let summary = format!("{vertices}, {edges} ({rods}), {faces}{notes}{lines}");
-    print_summary(args.output.as_deref(), &summary)
+    print_summary(&[args.output.as_deref(), args.edges.as_deref()], &summary)
 }
 
 /// Number of invalid elements that a summary names.

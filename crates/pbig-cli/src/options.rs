@@ -17,23 +17,25 @@ pub(crate) fn with_threads<T: Send>(
     pool.map_err(|error| Failure::Input(format!("--threads {threads}: {error}")))?.install(work)
 }
 
-/// Checks the option `-o` before the work.
+/// Checks the file of `-o` or another option before the work.
 pub(crate) fn check_output(
+    option: &str,
     output: Option<&Path>,
     known: &[&str],
     input: &Path,
     as_json: bool,
 ) -> Result<(), Failure> {
     let Some(output) = output else { return Ok(()) };
-    if files::is_stdout(output) && as_json {
-        return Err(Failure::Input("-o - and --json both write to stdout: leave out one".into()));
+    if files::is_stream(output) && as_json {
+        let both = format!("{option} - and --json both write to stdout: leave out one");
+        return Err(Failure::Input(both));
     }
-    Ok(files::check_output(output, known, input)?)
+    Ok(files::check_output(option, output, known, input)?)
 }
 
-/// Prints a summary where it does not mix with the output.
-pub(crate) fn print_summary(output: Option<&Path>, summary: &str) -> Result<(), Failure> {
-    if output.is_some_and(files::is_stdout) {
+/// Prints a summary where it does not mix with an output.
+pub(crate) fn print_summary(outputs: &[Option<&Path>], summary: &str) -> Result<(), Failure> {
+    if outputs.iter().flatten().any(|output| files::is_stream(output)) {
         print_aside(summary);
         return Ok(());
     }
@@ -65,6 +67,22 @@ pub(crate) fn margin(text: &str) -> Result<f32, String> {
         Ok(length) if length > f32::MAX => Err(format!("must be at most {:e}, the largest f32", f32::MAX)),
         Ok(length) if !length.is_nan() => Ok(length),
         _ => Err("must be a number".into()),
+    }
+}
+
+/// A distance by which boxes grow.
+pub(crate) fn thickness(text: &str) -> Result<f64, String> {
+    margin(text)?;
+    text.parse().map_err(|_| "must be a number".into())
+}
+
+/// Checks that stdin is not two inputs.
+pub(crate) fn check_inputs(inputs: &[&Path]) -> Result<(), Failure> {
+    let streams = inputs.iter().filter(|path| files::is_stream(path)).count();
+    if streams < 2 {
+        Ok(())
+    } else {
+        Err(Failure::Input("- is stdin, and cannot be two inputs: name a file".into()))
     }
 }
 

@@ -2,11 +2,12 @@
 
 use crate::mesh::{self, Kinds, kinds};
 use crate::options::{
-    THREADS, check_output, plan_text, print_summary, search_text, stages, whole, with_threads,
+    THREADS, check_inputs, check_output, plan_text, print_summary, search_text, stages, thickness, whole,
+    with_threads,
 };
 use pbig_core::{Error, Finder};
 use pbig_harness::files::{
-    BOXES_OR_PAIRS, BoxList, Location, ending, read_boxes, write_id_pairs, write_pairs,
+    BOXES_OR_PAIRS, BoxList, Location, ending, grown, name, read_boxes, write_id_pairs, write_pairs,
 };
 use pbig_harness::mesh::MESHES;
 use pbig_harness::options::BackendOption;
@@ -15,13 +16,13 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Boxes: .npy (N,6) float32 or float64, or .csv, columns min_x,min_y,min_z,max_x,max_y,max_z.
+    /// Boxes: .npy (N,6) float32 or float64, or .csv, columns min_x,min_y,min_z,max_x,max_y,max_z; `-` is stdin.
     #[arg(required_unless_present = "mesh")]
     input: Option<PathBuf>,
     /// More boxes: only pairs of a box `a` of INPUT with a box `b` of OTHER.
     #[arg(long, value_name = "OTHER")]
     with: Option<PathBuf>,
-    /// A mesh in place of boxes, .ply or .obj: pairs of its elements that share no vertex.
+    /// A mesh in place of boxes, .ply or .obj, `-` for stdin: pairs of its elements that share no vertex.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["input", "with"], requires = "elements")]
     mesh: Option<PathBuf>,
     /// The mesh a step later: boxes hold each element on its way there.
@@ -30,7 +31,13 @@ pub(crate) struct Args {
     /// Pairs of elements: ee, vf or any two of v (vertex), e (edge) and f (face), with commas.
     #[arg(long, value_name = "KINDS", value_parser = kinds, value_delimiter = ',', requires = "mesh")]
     pub(crate) elements: Vec<Kinds>,
-    /// File for the pairs: .npy (K,2) uint32 or .csv; `-` is stdout, as .csv.
+    /// File for the vertices of each edge: .npy (E,2) uint32 or .csv; row `i` has those of the edge `i`.
+    #[arg(long, value_name = "TABLE", requires = "mesh")]
+    pub(crate) edges: Option<PathBuf>,
+    /// Distance by which every box grows on all sides, rounded outward: half a thickness.
+    #[arg(long, value_name = "M", default_value = "0", value_parser = thickness, allow_negative_numbers = true)]
+    pub(crate) margin: f64,
+    /// File for the pairs: .npy (K,2) uint32 or .csv; `-` is stdout, as .csv. Of several KINDS a .npy gets one each: OUT-ee.npy.
     #[arg(short, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
     /// The backend that searches.
@@ -80,13 +87,16 @@ fn read<'a>(args: &'a Args, input: &'a Path) -> Result<Vec<Named<'a>>, Failure> 
     let paths: Vec<&Path> = [Some(input), args.with.as_deref()].into_iter().flatten().collect();
     for path in &paths {
         refuse_mesh(path)?;
-        check_output(args.output.as_deref(), &BOXES_OR_PAIRS, path, args.json)?;
+        check_output("-o", args.output.as_deref(), &BOXES_OR_PAIRS, path, args.json)?;
     }
-    let lists: Vec<Named<'_>> =
+    check_inputs(&paths)?;
+    let mut lists: Vec<Named<'_>> =
         paths.into_iter().map(|path| Ok((path, read_boxes(path)?))).collect::<Result<_, String>>()?;
     if args.strict {
         lists.iter().try_for_each(|(path, list)| refuse_invalid(path, list))?;
     }
+    let boxes = lists.iter_mut().flat_map(|(_, list)| &mut list.boxes);
+    boxes.for_each(|aabb| *aabb = grown(aabb, args.margin));
     Ok(lists)
 }
 
@@ -103,11 +113,11 @@ fn refuse_invalid(path: &Path, list: &BoxList) -> Result<(), Failure> {
     let Some((index, place)) = list.first_invalid else { return Ok(()) };
     let line = if let Location::Line(_) = place { format!("{place}: ") } else { String::new() };
     let what = "has a NaN or a minimum above its maximum; mend it, or leave out --strict";
-    Err(Failure::Input(format!("{}: {line}box {index} (counted from 0) {what}", path.display())))
+    Err(Failure::Input(format!("{}: {line}box {index} (counted from 0) {what}", name(path))))
 }
 
 fn find(finder: &mut Finder, lists: &[Named<'_>], args: &Args) -> Result<Vec<f64>, Failure> {
-    let names: Vec<String> = lists.iter().map(|(path, _)| path.display().to_string()).collect();
+    let names: Vec<String> = lists.iter().map(|(path, _)| name(path).to_string()).collect();
     repeated(args, &names.join(" with "), || match lists {
         [(_, a), (_, b)] => finder.find_between(&a.boxes, &b.boxes).map(|_| ()),
         [(_, all), ..] => finder.find(&all.boxes).map(|_| ()),
@@ -140,6 +150,7 @@ fn report(args: &Args, finder: &Finder, lists: &[Named<'_>], ms: Spread) -> Resu
             "backend": args.backend.in_use(report.fallback.as_deref()),
             "adapter": report.device.as_ref().map(|device| &device.name),
             "plan": plan_text(report),
+            "margin": args.margin,
             "ms": ms,
             "stages": stages(report),
         });
@@ -150,11 +161,11 @@ fn report(args: &Args, finder: &Finder, lists: &[Named<'_>], ms: Spread) -> Resu
     let first = first.next().map_or(String::new(), |(path, place)| first_text(lists.len(), path, &place));
     let summary =
         format!("{boxes} boxes ({invalid} invalid{first}), {pairs} overlapping pairs\n{ms}\n{plan}");
-    print_summary(args.output.as_deref(), &summary)
+    print_summary(&[args.output.as_deref()], &summary)
 }
 
 /// Says where the first invalid box is; of two files, in which.
 fn first_text(files: usize, path: &Path, place: &Location) -> String {
-    let file = if files > 1 { format!(" of {}", path.display()) } else { String::new() };
+    let file = if files > 1 { format!(" of {}", name(path)) } else { String::new() };
     format!(", the first in {place}{file}")
 }

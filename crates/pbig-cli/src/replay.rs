@@ -2,7 +2,7 @@
 
 use crate::options::{check_output, margin, plan_text, print_summary, search_text, stages};
 use pbig_core::{Aabb, BroadPhase, Error, Pair, ProxyFilter};
-use pbig_harness::files::{Frames, read_frames, write_csv};
+use pbig_harness::files::{Frames, name, read_frames, write_csv};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use std::time::Instant;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Frames: .npy (F,N,6) float32 or float64; a box of six NaN is absent in that frame.
+    /// Frames: .npy (F,N,6) float32 or float64; a box of six NaN is absent in that frame. `-` is stdin.
     frames: PathBuf,
     /// File for the events: .csv with frame,event,a,b; `-` is stdout.
     #[arg(short, value_name = "EVENTS.csv")]
@@ -40,9 +40,9 @@ struct Replay {
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    check_output(args.output.as_deref(), &["csv"], &args.frames, args.json)?;
+    check_output("-o", args.output.as_deref(), &["csv"], &args.frames, args.json)?;
     let frames = read_frames(&args.frames)?;
-    let about = |error| Failure::Input(format!("{}: {}", args.frames.display(), search_text(&error)));
+    let about = |error| Failure::Input(format!("{}: {}", name(&args.frames), search_text(&error)));
     let mut broad_phase = args
         .backend
         .broad_phase(args.margin)
@@ -138,5 +138,5 @@ fn report(args: &Args, frames: &Frames, replay: &Replay, broad_phase: &BroadPhas
         replay.invalid_line(),
         plan_text(report)
     );
-    print_summary(args.output.as_deref(), &summary)
+    print_summary(&[args.output.as_deref()], &summary)
 }

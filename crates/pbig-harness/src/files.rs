@@ -1,19 +1,21 @@
 //! Boxes in files, as the program `pbig` reads and writes them.
 
+mod grow;
 mod npy;
 mod text;
 mod write;
 
+pub use grow::grown;
 pub use npy::{npy_boxes, npy_frames};
 pub use text::csv_boxes;
 pub(crate) use text::{Lines, too_long};
-pub use write::{check_output, is_stdout, write_csv, write_id_pairs, write_pairs};
+pub use write::{check_output, is_stream, write_csv, write_id_pairs, write_pairs};
 
 use pbig_core::{Aabb, Limits};
 use std::fmt;
 use std::fs::File;
-use std::io::BufReader;
-use std::path::Path;
+use std::io::{self, BufRead, BufReader, Cursor, Read};
+use std::path::{Display, Path};
 
 /// The endings of a file of boxes, and of one of pairs.
 pub const BOXES_OR_PAIRS: [&str; 2] = ["npy", "csv"];
@@ -23,7 +25,19 @@ const MAX_BOXES: u64 = Limits::DEFAULT.max_boxes;
 
 /// Returns a message about a file, in one line that names it. Messages about the content alone do not know the name.
 fn at(path: &Path, what: impl fmt::Display) -> String {
-    format!("{}: {}", path.display(), one_line(what))
+    format!("{}: {}", name(path), one_line(what))
+}
+
+/// Returns the name of an input for messages.
+pub fn name(path: &Path) -> Display<'_> {
+    if is_stream(path) { Path::new("stdin").display() } else { path.display() }
+}
+
+/// Returns the first bytes of stdin, which tell formats apart, and all of it.
+pub(crate) fn stdin() -> Result<(Vec<u8>, impl BufRead), String> {
+    let (mut start, mut rest) = (Vec::new(), io::stdin().lock());
+    Read::take(&mut rest, npy::MAGIC.len() as u64).read_to_end(&mut start).map_err(one_line)?;
+    Ok((start.clone(), Cursor::new(start).chain(rest)))
 }
 
 /// Returns a library's message in one line.
@@ -102,16 +116,29 @@ impl<'a> Source<&'a [u8]> {
 }
 
 /// A list of boxes: `.npy` (N,6) float32 or float64 (rounded outward), or `.csv` with the columns
-/// min_x,min_y,min_z,max_x,max_y,max_z (rounded to nearest, which never parts two boxes that touch).
+/// min_x,min_y,min_z,max_x,max_y,max_z (rounded to nearest, which never parts two boxes that touch). `-` is stdin, with either.
 pub fn read_boxes(path: &Path) -> Result<BoxList, String> {
+    if is_stream(path) {
+        return boxes_of_stdin().map_err(|what| at(path, what));
+    }
     let is_npy = ending(path, &BOXES_OR_PAIRS)? == "npy";
     let source = Source::open(path)?;
     let read = if is_npy { npy::boxes(source) } else { text::boxes(source.reader, MAX_BOXES) };
     read.map_err(|what| at(path, what))
 }
 
-/// Frames of boxes: `.npy` (F,N,6) float32 or float64 (rounded outward).
+fn boxes_of_stdin() -> Result<BoxList, String> {
+    let (start, reader) = stdin()?;
+    let is_npy = start.starts_with(npy::MAGIC);
+    if is_npy { npy::boxes(Source { reader, length: None }) } else { text::boxes(reader, MAX_BOXES) }
+}
+
+/// Frames of boxes: `.npy` (F,N,6) float32 or float64 (rounded outward); `-` is stdin.
 pub fn read_frames(path: &Path) -> Result<Frames, String> {
+    if is_stream(path) {
+        let read = stdin().and_then(|(_, reader)| npy::frames(Source { reader, length: None }));
+        return read.map_err(|what| at(path, what));
+    }
     ending(path, &["npy"])?;
     npy::frames(Source::open(path)?).map_err(|what| at(path, what))
 }

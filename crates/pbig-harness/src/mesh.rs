@@ -6,7 +6,7 @@ mod reading;
 #[cfg(test)]
 mod tests_of_files;
 
-use crate::files::{Location, counted};
+use crate::files::{Location, counted, grown};
 use pbig_core::{Aabb, Boxes, Keys, NO_KEY};
 use reading::Oddity;
 use std::collections::BTreeMap;
@@ -74,6 +74,13 @@ pub struct MeshElements {
 }
 
 impl MeshElements {
+    /// Grows all boxes by a margin, see [`grown`].
+    pub fn grow(&mut self, margin: f64) {
+        for elements in [&mut self.vertices, &mut self.edges, &mut self.faces] {
+            elements.boxes.iter_mut().for_each(|aabb| *aabb = grown(aabb, margin));
+        }
+    }
+
     /// Returns the vertices (`v`), edges (`e`) or, for any other kind, faces.
     pub fn of(&self, kind: char) -> &Elements {
         match kind {

@@ -2,10 +2,12 @@
 
 mod bench;
 mod files;
+mod margin;
 mod mesh;
 mod refused;
 mod replay;
 mod sets;
+mod streams;
 mod usage;
 
 use ndarray::{Array, Array2, Array3, Dimension, ShapeBuilder};
@@ -14,8 +16,9 @@ use pbig_core::{Aabb, Pair, oracle};
 use pbig_harness::boxes::BoxSet;
 use pbig_harness::scenes::Scene;
 use serde_json::Value;
+use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn pbig(folder: &Path, args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_pbig"));
@@ -28,6 +31,18 @@ fn pbig_where(folder: &Path, variable: &str, value: &str, args: &[&str]) -> Outp
     // Some drivers complain on stderr when they have no such folder.
     let command = command.env(variable, value).env("XDG_RUNTIME_DIR", folder);
     command.current_dir(folder).args(args).output().expect("the program starts")
+}
+
+/// As `pbig`, with these bytes on stdin.
+fn pbig_fed(folder: &Path, bytes: &[u8], args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pbig"));
+    let command = command.current_dir(folder).args(args);
+    let pipes = [Stdio::piped(), Stdio::piped(), Stdio::piped()];
+    let [stdin, stdout, stderr] = pipes;
+    let mut child = command.stdin(stdin).stdout(stdout).stderr(stderr).spawn().expect("the program starts");
+    // It may refuse before it has read all.
+    _ = child.stdin.take().expect("a pipe").write_all(bytes);
+    child.wait_with_output().expect("the program ends")
 }
 
 fn json(output: &Output) -> Value {
@@ -219,7 +234,6 @@ fn scenes_and_doctor_say_what_there_is() {
 
 #[test]
 fn a_reader_that_goes_away_is_no_failure() {
-    use std::process::Stdio;
     let mut child = Command::new(env!("CARGO_BIN_EXE_pbig"))
         .arg("scenes")
         .stdout(Stdio::piped())

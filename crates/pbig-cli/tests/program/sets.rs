@@ -145,10 +145,6 @@ fn a_wrong_mesh_or_option_is_refused_in_one_line() {
         &["mesh.stl: expected a file that ends in .ply or .obj"],
     );
     refused(
-        &mesh("mesh.obj", &["--elements", "ee,vf", "-o", "out.npy"]),
-        &["out.npy: a .npy holds pairs of one entry"],
-    );
-    refused(
         &mesh("mesh.obj", &["--elements", "ee", "-o", "mesh.obj"]),
         &["mesh.obj: expected a file that ends in .npy or .csv"],
     );

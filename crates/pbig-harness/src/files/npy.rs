@@ -6,7 +6,7 @@ use pbig_core::Aabb;
 use std::io::{ErrorKind, Read};
 
 /// The first bytes of every `.npy` file.
-const MAGIC: &[u8] = b"\x93NUMPY";
+pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// The content of an `.npy` file of boxes, see [`super::read_boxes`].
 pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, String> {

@@ -1,25 +1,25 @@
 //! Files that the program `pbig` writes.
 
-use super::{BOXES_OR_PAIRS, at, ending};
+use super::{BOXES_OR_PAIRS, at, ending, name};
 use ndarray::Array2;
 use pbig_core::Pair;
 use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::Path;
 
-/// Returns true for `-`, the name of stdout.
-pub fn is_stdout(path: &Path) -> bool {
+/// Returns true for `-`, the name of stdin and stdout.
+pub fn is_stream(path: &Path) -> bool {
     path == "-"
 }
 
 /// Checks, before the work, that an output has a known ending and is not the input.
-pub fn check_output(output: &Path, known: &[&str], input: &Path) -> Result<(), String> {
-    if is_stdout(output) {
+pub fn check_output(option: &str, output: &Path, known: &[&str], input: &Path) -> Result<(), String> {
+    if is_stream(output) {
         return Ok(());
     }
     ending(output, known)?;
     match is_same_file(output, input) {
-        true => Err(at(output, format!("-o names the input, {}; name another file", input.display()))),
+        true => Err(at(output, format!("{option} names the input, {}; name another file", name(input)))),
         false => Ok(()),
     }
 }
@@ -47,7 +47,7 @@ pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), String> {
 
 /// Pairs of any two lists, as [`write_pairs`] does.
 pub fn write_id_pairs(path: &Path, pairs: impl Iterator<Item = [u32; 2]>) -> Result<(), String> {
-    if is_stdout(path) || ending(path, &BOXES_OR_PAIRS)? == "csv" {
+    if is_stream(path) || ending(path, &BOXES_OR_PAIRS)? == "csv" {
         return write_csv(path, "a,b", pairs.map(|[a, b]| format!("{a},{b}")));
     }
     let flat: Vec<u32> = pairs.flatten().collect();
@@ -57,7 +57,7 @@ pub fn write_id_pairs(path: &Path, pairs: impl Iterator<Item = [u32; 2]>) -> Res
 
 /// A text file of a header and lines, or these on stdout.
 pub fn write_csv(path: &Path, header: &str, lines: impl IntoIterator<Item = String>) -> Result<(), String> {
-    if is_stdout(path) {
+    if is_stream(path) {
         return match write_lines(io::stdout().lock(), header, lines) {
             // A reader that has gone away (`| head`) is not an error.
             Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(at(Path::new("stdout"), error)),

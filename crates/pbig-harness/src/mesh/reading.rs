@@ -1,7 +1,7 @@
 //! Meshes from files: what both formats have in common.
 
 use super::{MESHES, Mesh, obj, ply};
-use crate::files::{Location, brief, ending, one_line};
+use crate::files::{Location, brief, ending, is_stream, name, one_line, stdin};
 use pbig_core::NO_KEY;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -33,14 +33,23 @@ impl Oddity {
 }
 
 impl Mesh {
-    /// Reads a `.ply` or `.obj` file.
+    /// Reads a `.ply` or `.obj` file; `-` is stdin, with either.
     ///
     /// # Errors
     /// The file, what is wrong and where, in one line.
     pub fn read(path: &Path) -> Result<Self, String> {
+        if is_stream(path) {
+            return Self::from_stdin().map_err(|what| format!("{}: {what}", name(path)));
+        }
         let read = if ending(path, &MESHES)? == "ply" { Self::from_ply } else { Self::from_obj };
         let file = std::fs::File::open(path).map_err(|error| error.to_string());
         file.and_then(|file| read(BufReader::new(file))).map_err(|what| format!("{}: {what}", path.display()))
+    }
+
+    fn from_stdin() -> Result<Self, String> {
+        let (start, content) = stdin()?;
+        let is_ply = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start).starts_with(b"ply");
+        if is_ply { Self::from_ply(content) } else { Self::from_obj(content) }
     }
 
     /// Reads the content of a `.ply` file.
