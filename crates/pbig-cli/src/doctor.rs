@@ -6,9 +6,57 @@ use pbig_gpu::{Coding, GpuError, GpuFinder, GpuOptions, adapters};
 use pbig_harness::prelude::*;
 use pbig_harness::report::simd_found;
 
-pub(crate) fn run() -> Result<(), Failure> {
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The adapter that `--backend gpu` uses, by a part of its name, as in `pbig pairs --adapter NAME`.
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// An adapter of this machine.
+struct Candidate {
+    adapter: wgpu::Adapter,
+    opened: Result<GpuFinder, GpuError>,
+    /// True for the adapter of `--backend gpu`.
+    is_used: bool,
+}
+
+/// A finder, the set of boxes that it was tested on, and `ok` or what was wrong.
+struct Tested {
+    finder: String,
+    set: &'static str,
+    verdict: String,
+}
+
+/// The adapter of `--backend gpu`, or why there is none.
+type Chosen = Result<wgpu::AdapterInfo, GpuError>;
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let chosen = pbig_gpu::adapter(args.adapter.as_deref()).map(|adapter| adapter.get_info());
+    if let (Some(name), Err(error)) = (&args.adapter, &chosen) {
+        return Err(Failure::Input(format!("--adapter {name}: {error}")));
+    }
+    let candidates = candidates(&chosen);
+    let say = |text: &str| if args.json { Ok(()) } else { print(text) };
+    say(&describe_machine())?;
+    say(&describe_adapters(&candidates, &chosen))?;
+    say("self-test, 2000 boxes of each set against brute force:")?;
+    let tested =
+        test_all(&candidates, |one| say(&format!("  {:<12} {:<10} {}", one.finder, one.set, one.verdict)))?;
+    if args.json {
+        print(&object(&candidates, &chosen, &tested).to_string())?;
+    }
+    let wrong = tested.iter().filter(|one| one.verdict != "ok");
+    let wrong: Vec<String> = wrong.map(|one| format!("{} on {}", one.finder, one.set)).collect();
+    check(wrong.is_empty(), || format!("self-test failed: {}", wrong.join(", ")))
+}
+
+fn describe_machine() -> String {
     let Limits { max_boxes, max_pairs } = Limits::DEFAULT;
-    print(&format!(
+    format!(
         "pbig {}\n\
          CPU: {} threads, SIMD found: {}; SIMD used: {}\n\
          limits: {max_boxes} boxes, {max_pairs} pairs (pbig_core::Limits)\n\
@@ -17,34 +65,76 @@ pub(crate) fn run() -> Result<(), Failure> {
         rayon::current_num_threads(),
         simd_found().join(" "),
         pbig_core::simd(),
-    ))?;
-    let gpus = describe_adapters()?;
-    print("self-test, 2000 boxes of each set against brute force:")?;
-    let finders = cpu_finders().into_iter().chain(gpus.iter().flat_map(gpu_finders));
-    let mut wrong = Vec::new();
-    for (name, finder) in finders {
-        wrong.extend(test(&name, finder)?);
-    }
-    check(wrong.is_empty(), || format!("self-test failed: {}", wrong.join(", ")))
+    )
 }
 
-/// Prints every adapter, and returns those on which the kernels can run.
-fn describe_adapters() -> Result<Vec<(String, GpuFinder)>, Failure> {
-    let adapters = adapters();
-    if adapters.is_empty() {
-        let why = match GpuFinder::new() {
-            Err(why @ GpuError::UnknownApi { .. }) => format!(": {why}"),
-            _ => String::new(),
-        };
-        print(&format!("adapters: none; `--backend gpu` falls back to the CPU{why}"))?;
+/// Opens all adapters.
+fn candidates(chosen: &Chosen) -> Vec<Candidate> {
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for adapter in adapters() {
+        let is_used = chosen.as_ref() == Ok(&adapter.get_info()) && !candidates.iter().any(|one| one.is_used);
+        candidates.push(Candidate { opened: GpuFinder::on(&adapter), adapter, is_used });
     }
-    let mut usable = Vec::new();
-    for (i, adapter) in adapters.iter().enumerate() {
-        let opened = GpuFinder::on(adapter);
-        print(&describe(i, adapter, &opened))?;
-        usable.extend(opened.ok().map(|gpu| (format!("gpu {i}"), gpu)));
+    candidates
+}
+
+/// Describes every adapter, and says why none is used, and what to do.
+fn describe_adapters(candidates: &[Candidate], chosen: &Chosen) -> String {
+    let fallback = |why| format!("`--backend gpu` falls back to the CPU: {why}");
+    let mut lines: Vec<String> = candidates.iter().enumerate().map(describe).collect();
+    match chosen {
+        Err(why) if candidates.is_empty() => lines.push(format!("adapters: none; {}", fallback(why))),
+        Err(why) => lines.push(fallback(why)),
+        Ok(_) => {}
     }
-    Ok(usable)
+    lines.extend(advice(candidates));
+    lines.join("\n")
+}
+
+/// Returns what to do where no adapter is hardware.
+fn advice(candidates: &[Candidate]) -> Option<String> {
+    let is_software = |one: &Candidate| one.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
+    if !candidates.iter().all(is_software) {
+        return None;
+    }
+    let api = std::env::var("WGPU_BACKEND");
+    Some(api.map_or(INSTALL.into(), |api| {
+        format!("no GPU is found: WGPU_BACKEND={api:?} leaves out other APIs; unset it")
+    }))
+}
+
+const INSTALL: &str = "no GPU is found: install its driver with Vulkan (NVIDIA: the vendor's; AMD and Intel: mesa-vulkan-drivers on Debian and \
+                       Ubuntu). A container must be given the GPU; NVIDIA's also needs NVIDIA_DRIVER_CAPABILITIES=graphics,compute,utility";
+
+/// Returns all that the text says, as JSON.
+fn object(candidates: &[Candidate], chosen: &Chosen, tested: &[Tested]) -> serde_json::Value {
+    let adapter = |one: &Candidate| {
+        let (info, limits) = (one.adapter.get_info(), one.adapter.limits());
+        serde_json::json!({
+            "adapter": pbig_gpu::describe(&info),
+            "driver": format!("{} {}", info.driver, info.driver_info),
+            "is_software": info.device_type == wgpu::DeviceType::Cpu,
+            "is_used": one.is_used,
+            "error": one.opened.as_ref().err().map(ToString::to_string),
+            "max_buffer_bytes": limits.max_buffer_size,
+            "max_binding_bytes": limits.max_storage_buffer_binding_size,
+        })
+    };
+    let test =
+        |one: &Tested| serde_json::json!({ "finder": one.finder, "boxes": one.set, "verdict": one.verdict });
+    serde_json::json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "threads": rayon::current_num_threads(),
+        "simd_found": simd_found(),
+        "simd": pbig_core::simd().to_string(),
+        "max_boxes": Limits::DEFAULT.max_boxes,
+        "max_pairs": Limits::DEFAULT.max_pairs,
+        "adapter": chosen.as_ref().ok().map(pbig_gpu::describe),
+        "fallback": chosen.as_ref().err().map(ToString::to_string),
+        "advice": advice(candidates),
+        "adapters": candidates.iter().map(adapter).collect::<Vec<_>>(),
+        "self_test": tested.iter().map(test).collect::<Vec<_>>(),
+    })
 }
 
 /// Returns the variant of each stage that runs on an adapter, and the reason.
@@ -64,9 +154,9 @@ fn variants(adapter: &wgpu::Adapter) -> [String; 3] {
 }
 
 /// An adapter, its limits, and the variant of each stage that runs on it and why.
-fn describe(i: usize, adapter: &wgpu::Adapter, opened: &Result<GpuFinder, GpuError>) -> String {
+fn describe((i, Candidate { adapter, opened, is_used }): (usize, &Candidate)) -> String {
     let (info, limits) = (adapter.get_info(), adapter.limits());
-    let chosen = if i == 0 { ", used by `--backend gpu` unless WGPU_ADAPTER_NAME names another" } else { "" };
+    let chosen = if *is_used { ", used by `--backend gpu`" } else { "" };
     let mib = |bytes: u64| bytes >> 20;
     let features = match opened {
         Ok(_) => variants(adapter).join("\n    "),
@@ -93,7 +183,7 @@ fn cpu_finders() -> [(String, Finder); 2] {
 }
 
 /// Returns finders on a device in both codings, always with the grid.
-fn gpu_finders((name, gpu): &(String, GpuFinder)) -> [(String, Finder); 2] {
+fn gpu_finders(name: &str, gpu: &GpuFinder) -> [(String, Finder); 2] {
     [(Coding::Plain, "plain"), (Coding::Packed, "packed")].map(|(coding, words)| {
         let options = GpuOptions { coding, all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
         let config = Config { backend: Backend::Device, ..Config::DEFAULT };
@@ -108,20 +198,29 @@ fn find(finder: &mut Finder, boxes: &[Aabb]) -> Result<Vec<Pair>, String> {
     finder.report().fallback.clone().map_or(Ok(pairs), Err)
 }
 
-/// Tests a finder on every set; returns what was wrong.
-fn test(name: &str, mut finder: Finder) -> Result<Vec<String>, Failure> {
-    let mut wrong = Vec::new();
-    for set in BoxSet::ALL {
-        let boxes = set.boxes(2000, 1);
-        let verdict = match find(&mut finder, &boxes) {
-            Err(why) => why,
-            Ok(pairs) if pairs == oracle::pairs(&boxes) => "ok".into(),
-            Ok(_) => "WRONG".into(),
-        };
-        print(&format!("  {name:<12} {:<10} {verdict}", set.name))?;
-        if verdict != "ok" {
-            wrong.push(format!("{name} on {}", set.name));
+/// Tests all finders on every set. Passes each result on as it comes.
+fn test_all(
+    candidates: &[Candidate],
+    mut tell: impl FnMut(&Tested) -> Result<(), Failure>,
+) -> Result<Vec<Tested>, Failure> {
+    let opened = candidates.iter().enumerate().filter_map(|(i, one)| Some((i, one.opened.as_ref().ok()?)));
+    let gpus = opened.flat_map(|(i, gpu)| gpu_finders(&format!("gpu {i}"), gpu));
+    let mut tested = Vec::new();
+    for (finder, mut it) in cpu_finders().into_iter().chain(gpus) {
+        for set in BoxSet::ALL {
+            let one = Tested { finder: finder.clone(), set: set.name, verdict: verdict(&mut it, set) };
+            tell(&one)?;
+            tested.push(one);
         }
     }
-    Ok(wrong)
+    Ok(tested)
+}
+
+fn verdict(finder: &mut Finder, set: BoxSet) -> String {
+    let boxes = set.boxes(2000, 1);
+    match find(finder, &boxes) {
+        Err(why) => why,
+        Ok(pairs) if pairs == oracle::pairs(&boxes) => "ok".into(),
+        Ok(_) => "WRONG".into(),
+    }
 }

@@ -1,6 +1,7 @@
 //! The program `pbig`. Its commands, files, JSON and exit status are in docs/CLI.md; other programs
 //! rely on them.
 
+mod backend;
 mod bench;
 mod doctor;
 mod mesh;
@@ -52,16 +53,26 @@ enum Command {
     #[command(hide = true)]
     MemoryProbe(bench::memory::Args),
     /// Prints what this machine offers and what is chosen, with reasons, and runs a self-test.
-    Doctor,
+    Doctor(doctor::Args),
 }
 
 fn main() -> ExitCode {
+    silence_drivers();
     let result = match Cli::try_parse() {
         Ok(cli) => run(cli.command),
         Err(error) if !error.use_stderr() => print(&error.to_string()),
         Err(error) => Err(usage::failure(&error, &Cli::command(), std::env::args_os().nth(1))),
     };
     finish("pbig", result)
+}
+
+/// Keeps drivers that look for a window system from complaining on stderr that there is none.
+fn silence_drivers() {
+    const FOLDER: &str = "XDG_RUNTIME_DIR";
+    if cfg!(target_os = "linux") && std::env::var_os(FOLDER).is_none() {
+        // SAFETY: No other thread runs yet.
+        unsafe { std::env::set_var(FOLDER, "/nonexistent") };
+    }
 }
 
 fn run(command: Command) -> Result<(), Failure> {
@@ -73,6 +84,6 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Bench(args) => bench::run(&args),
         Command::Accuracy { options } => studies::run("accuracy", options),
         Command::MemoryProbe(args) => bench::memory::probe(&args),
-        Command::Doctor => doctor::run(),
+        Command::Doctor(args) => doctor::run(&args),
     }
 }

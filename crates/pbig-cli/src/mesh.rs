@@ -1,7 +1,7 @@
 //! `pbig pairs --mesh`: candidate pairs of the vertices, edges and faces of a mesh, without those that share a vertex.
 
 use crate::options::{check_inputs, check_output, plan_text, print_summary, with_threads};
-use crate::pairs::{Args, repeated};
+use crate::pairs::{Args, adapter, repeated};
 use pbig_core::{Finder, Report};
 use pbig_harness::files::{BOXES_OR_PAIRS, Location, counted, ending, name, write_csv, write_id_pairs};
 use pbig_harness::mesh::{Elements, Mesh, MeshElements};
@@ -57,6 +57,9 @@ pub(crate) fn run(args: &Args, path: &Path) -> Result<(), Failure> {
     warn_of_none(args, path, &elements);
     let find_all = || args.elements.iter().map(|kinds| find(args, path, kinds, &elements)).collect();
     let all: Vec<Found> = with_threads(args.threads, find_all)?;
+    for Found { report, .. } in &all {
+        args.backend.check_use(adapter(report), report.fallback.as_deref())?;
+    }
     write(&outputs, &all)?;
     if let Some(table) = &args.edges {
         write_id_pairs(table, elements.edges.keys.iter().map(|[a, b, ..]| [*b, *a]))?;
@@ -131,7 +134,7 @@ fn for_kinds(output: &Path, Kinds(kinds): &Kinds) -> PathBuf {
 }
 
 fn find(args: &Args, path: &Path, kinds: &Kinds, elements: &MeshElements) -> Result<Found, Failure> {
-    let mut finder = args.backend.finder();
+    let mut finder = args.backend.finder()?;
     let subject = format!("{}: {}", name(path), kinds.0);
     let times = repeated(args, &subject, || search(&mut finder, kinds.of(elements)))?;
     let pairs = finder.pairs().iter().map(|pair| [pair.a, pair.b]);

@@ -1,16 +1,16 @@
 //! `pbig pairs`: all overlapping pairs of the boxes in a file, or of a box of each of two files.
 
+use crate::backend::{BackendArgs, adapter_line};
 use crate::mesh::{self, Kinds, kinds};
 use crate::options::{
     THREADS, check_inputs, check_output, plan_text, print_summary, search_text, stages, thickness, whole,
     with_threads,
 };
-use pbig_core::{Error, Finder};
+use pbig_core::{Error, Finder, Report};
 use pbig_harness::files::{
     BOXES_OR_PAIRS, BoxList, Location, ending, grown, name, read_boxes, write_id_pairs, write_pairs,
 };
 use pbig_harness::mesh::MESHES;
-use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -40,9 +40,8 @@ pub(crate) struct Args {
     /// File for the pairs: .npy (K,2) uint32 or .csv; `-` is stdout, as .csv. Of several KINDS a .npy gets one each: OUT-ee.npy.
     #[arg(short, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
-    /// The backend that searches.
-    #[arg(long, value_enum, default_value_t)]
-    pub(crate) backend: BackendOption,
+    #[command(flatten)]
+    pub(crate) backend: BackendArgs,
     /// Threads; all by default.
     #[arg(long, value_name = "N", value_parser = whole::<usize>(THREADS), allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
@@ -70,8 +69,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 fn search(args: &Args, input: &Path) -> Result<(), Failure> {
     let lists = read(args, input)?;
-    let mut finder = args.backend.finder();
+    let mut finder = args.backend.finder()?;
     let times = with_threads(args.threads, || find(&mut finder, &lists, args))?;
+    args.backend.check_use(adapter(finder.report()), finder.report().fallback.as_deref())?;
     match &args.output {
         Some(output) if args.with.is_some() => {
             write_id_pairs(output, finder.pairs_between().iter().map(|pair| [pair.a, pair.b]))?;
@@ -148,7 +148,7 @@ fn report(args: &Args, finder: &Finder, lists: &[Named<'_>], ms: Spread) -> Resu
             "pairs": pairs,
             "invalid": invalid,
             "backend": args.backend.in_use(report.fallback.as_deref()),
-            "adapter": report.device.as_ref().map(|device| &device.name),
+            "adapter": adapter(report),
             "plan": plan_text(report),
             "margin": args.margin,
             "ms": ms,
@@ -159,9 +159,15 @@ fn report(args: &Args, finder: &Finder, lists: &[Named<'_>], ms: Spread) -> Resu
     let plan = plan_text(report);
     let mut first = lists.iter().filter_map(|(path, list)| Some((path, list.first_invalid?.1)));
     let first = first.next().map_or(String::new(), |(path, place)| first_text(lists.len(), path, &place));
+    let adapter = adapter_line(adapter(report));
     let summary =
-        format!("{boxes} boxes ({invalid} invalid{first}), {pairs} overlapping pairs\n{ms}\n{plan}");
+        format!("{boxes} boxes ({invalid} invalid{first}), {pairs} overlapping pairs\n{ms}\n{plan}{adapter}");
     print_summary(&[args.output.as_deref()], &summary)
+}
+
+/// Returns the name of the adapter that did the work, if one did.
+pub(crate) fn adapter(report: &Report) -> Option<&str> {
+    report.device.as_ref().map(|device| device.name.as_str())
 }
 
 /// Says where the first invalid box is; of two files, in which.

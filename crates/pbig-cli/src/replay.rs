@@ -1,9 +1,9 @@
 //! `pbig replay`: the incremental path over frames of boxes.
 
+use crate::backend::{BackendArgs, adapter_line};
 use crate::options::{check_output, margin, plan_text, print_summary, search_text, stages};
 use pbig_core::{Aabb, BroadPhase, Error, Pair, ProxyFilter};
 use pbig_harness::files::{Frames, name, read_frames, write_csv};
-use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -15,9 +15,8 @@ pub(crate) struct Args {
     /// File for the events: .csv with frame,event,a,b; `-` is stdout.
     #[arg(short, value_name = "EVENTS.csv")]
     output: Option<PathBuf>,
-    /// The backend that searches.
-    #[arg(long, value_enum, default_value_t)]
-    backend: BackendOption,
+    #[command(flatten)]
+    backend: BackendArgs,
     /// Distance by which a stored box is larger than the given one.
     #[arg(long, value_name = "M", default_value = "0", value_parser = margin, allow_negative_numbers = true)]
     margin: f32,
@@ -37,20 +36,20 @@ struct Replay {
     /// Frame and index of the first invalid box.
     first_invalid: Option<(usize, usize)>,
     keep_lines: bool,
+    /// The reason why the CPU did the work of a wanted device, if it ever did.
+    fallback: Option<String>,
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     check_output("-o", args.output.as_deref(), &["csv"], &args.frames, args.json)?;
     let frames = read_frames(&args.frames)?;
     let about = |error| Failure::Input(format!("{}: {}", name(&args.frames), search_text(&error)));
-    let mut broad_phase = args
-        .backend
-        .broad_phase(args.margin)
-        .map_err(|error| Failure::Input(format!("--margin: {error}")))?;
+    let mut broad_phase = args.backend.broad_phase(args.margin)?;
     let mut replay = Replay { keep_lines: args.output.is_some(), ..Replay::default() };
     for frame in tracked(&frames.frames, "frames") {
         replay.step(&mut broad_phase, frame).map_err(about)?;
     }
+    args.backend.check_use(broad_phase.device_name(), replay.fallback.as_deref())?;
     if let Some(output) = &args.output {
         write_csv(output, "frame,event,a,b", std::mem::take(&mut replay.lines))?;
     }
@@ -75,6 +74,7 @@ impl Replay {
         self.times.push(milliseconds(clock.elapsed()));
         self.note_invalid(frame);
         self.invalid += broad_phase.report().invalid;
+        self.fallback = self.fallback.take().or_else(|| broad_phase.report().fallback.clone());
         self.count(broad_phase, left);
         Ok(())
     }
@@ -133,10 +133,11 @@ fn report(args: &Args, frames: &Frames, replay: &Replay, broad_phase: &BroadPhas
     }
     let summary = format!(
         "{count} frames of {boxes} boxes: {added} pairs added, {removed} removed, {} at the end\n\
-         {}a frame: {ms}\nlast frame: {}",
+         {}a frame: {ms}\nlast frame: {}{}",
         broad_phase.pair_count(),
         replay.invalid_line(),
-        plan_text(report)
+        plan_text(report),
+        adapter_line(broad_phase.device_name()),
     );
     print_summary(&[args.output.as_deref()], &summary)
 }

@@ -1,7 +1,7 @@
 //! `pbig simulate` and `pbig scenes`: headless rapier worlds.
 
+use crate::backend::{BackendArgs, adapter_line};
 use crate::options::{BODIES, whole};
-use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use pbig_harness::runner::{Run, StepTime};
 use pbig_harness::scenes::Scene;
@@ -24,9 +24,8 @@ pub(crate) struct Args {
     /// The broad phase that drives the world.
     #[arg(long, default_value = "pbig", value_parser = ["pbig", "stock"])]
     broad_phase: String,
-    /// The backend of pbig.
-    #[arg(long, value_enum, default_value_t)]
-    backend: BackendOption,
+    #[command(flatten)]
+    backend: BackendArgs,
     /// Seed of the scene's random numbers.
     #[arg(long, default_value = "1", value_parser = whole::<u64>(0..=u64::MAX), allow_negative_numbers = true)]
     seed: u64,
@@ -53,7 +52,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if args.broad_phase == "stock" {
         return finish(args, bodies, Run::new(scene, bodies, args.seed, DefaultBroadPhase::new()), |_| None);
     }
-    let run = Run::new(scene, bodies, args.seed, args.backend.for_rapier());
+    let run = Run::new(scene, bodies, args.seed, args.backend.for_rapier()?);
     let run = if args.check { run.checked(PbigConfig::DEFAULT.margin, 1) } else { run };
     finish(args, bodies, run, |ours| Some(ours))
 }
@@ -72,8 +71,18 @@ fn finish<B: BroadPhase>(
     ours: fn(&B) -> Option<&PbigBroadPhase>,
 ) -> Result<(), Failure> {
     let bar = progress(args.steps, "steps");
-    run.steps(args.steps, || bar.inc(1));
+    let mut fallback = None;
+    for _ in 0..args.steps {
+        run.steps(1, || bar.inc(1));
+        fallback = fallback.or_else(|| fallback_of(ours(&run.broad_phase.inner)).map(str::to_owned));
+        if run.broad_phase.first_difference().is_some() {
+            break;
+        }
+    }
     bar.finish_and_clear();
+    if let Some(ours) = ours(&run.broad_phase.inner) {
+        args.backend.check_use(ours.device_name(), fallback.as_deref())?;
+    }
     let frames = run.write_failure(&args.scene, Path::new("."));
     let file = frames.as_ref().and_then(|frames| frames.as_ref().ok());
     report(args, bodies, &run, ours(&run.broad_phase.inner), file)?;
@@ -84,6 +93,11 @@ fn finish<B: BroadPhase>(
     }))
 }
 
+/// Returns the reason why the CPU did the work of a wanted device in the last step, if it did.
+fn fallback_of(ours: Option<&PbigBroadPhase>) -> Option<&str> {
+    ours?.stats().report.fallback.as_deref()
+}
+
 fn report<B: BroadPhase>(
     args: &Args,
     bodies: usize,
@@ -91,7 +105,7 @@ fn report<B: BroadPhase>(
     ours: Option<&PbigBroadPhase>,
     file: Option<&PathBuf>,
 ) -> Result<(), Failure> {
-    let fallback = ours.and_then(|ours| ours.stats().report.fallback.as_deref());
+    let fallback = fallback_of(ours);
     let backend = if ours.is_some() { args.backend.in_use(fallback) } else { "cpu" };
     let spread = |of: fn(&StepTime) -> f64| Spread::of(run.times.iter().map(of));
     let (broad_phase, step) = (spread(|time| time.broad_phase), spread(|time| time.step));
@@ -121,10 +135,11 @@ fn report<B: BroadPhase>(
     print(&format!(
         "{}: {bodies} bodies, {colliders} colliders, {steps} steps with the {} broad phase\n\
          a step: broad phase {broad_phase}, all {step}\n\
-         {pairs} pairs at the end; {added} added, {removed} removed\n{}{note}",
+         {pairs} pairs at the end; {added} added, {removed} removed\n{}{note}{}",
         args.scene,
         args.broad_phase,
         checker.map_or(String::new(), check_line),
+        adapter_line(ours.and_then(PbigBroadPhase::device_name)),
     ))
 }
 

@@ -44,5 +44,5 @@ pub use gpu::GpuFinders;
 #[cfg(feature = "wgpu")]
 pub use gpu::testing;
 #[cfg(feature = "wgpu")]
-pub use gpu::{GpuError, GpuFinder, adapters, describe};
+pub use gpu::{GpuError, GpuFinder, adapter, adapters, describe};
 pub use options::{Coding, GpuOptions};

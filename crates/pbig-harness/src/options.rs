@@ -20,25 +20,21 @@ pub enum BackendOption {
 }
 
 impl BackendOption {
-    pub fn finder(self) -> Finder {
-        finder(Config { backend: self.backend(), ..Config::DEFAULT }, GpuOptions::DEFAULT)
-    }
-
-    /// Returns a broad phase.
-    pub fn broad_phase(self, margin: f32) -> Result<BroadPhase, Error> {
-        broad_phase(Config { margin, backend: self.backend(), ..Config::DEFAULT }, GpuOptions::DEFAULT)
-    }
-
     pub fn for_rapier(self) -> PbigBroadPhase {
+        self.for_rapier_on(shared_gpu(self.backend(), GpuOptions::DEFAULT))
+    }
+
+    /// Returns a broad phase for rapier, on a device if there is one.
+    pub fn for_rapier_on(self, device: Option<Box<dyn PairDevice>>) -> PbigBroadPhase {
         let config = PbigConfig { backend: self.backend(), ..PbigConfig::DEFAULT };
         let mut broad_phase = PbigBroadPhase::with_config(config).expect("the default margin is a length");
-        if let Some(gpu) = shared_gpu(config.backend, GpuOptions::DEFAULT) {
-            broad_phase.set_device(gpu);
+        if let Some(device) = device {
+            broad_phase.set_device(device);
         }
         broad_phase
     }
 
-    fn backend(self) -> Backend {
+    pub fn backend(self) -> Backend {
         match self {
             Self::Auto => Backend::Auto,
             Self::Cpu => Backend::Cpu,

@@ -2,6 +2,7 @@
 
 mod bench;
 mod files;
+mod gpu;
 mod margin;
 mod mesh;
 mod refused;

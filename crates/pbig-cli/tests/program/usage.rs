@@ -73,3 +73,22 @@ fn what_stock_would_ignore_is_refused() {
     let wanted = "leave out --check or --broad-phase stock";
     assert!(line.starts_with("--check is for pbig") && line.ends_with(wanted), "{line}");
 }
+
+/// Returns the words of a text that begin with two hyphens.
+fn options(text: &str) -> impl Iterator<Item = &str> {
+    let words = text.split(|c: char| !c.is_ascii_lowercase() && c != '-');
+    words.filter(|word| word.strip_prefix("--").is_some_and(|name| name.starts_with(char::is_alphabetic)))
+}
+
+#[test]
+fn every_option_of_the_document_is_one_of_the_program() {
+    let document =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/CLI.md")).expect("CLI.md");
+    let help = |command: &&str| pbig(std::path::Path::new("."), &[command, "--help"]).stdout;
+    let commands = ["pairs", "replay", "simulate", "bench", "doctor"];
+    let help = String::from_utf8(commands.iter().flat_map(help).collect()).expect("UTF-8");
+    let known: Vec<&str> = options(&help).chain(["--bin", "--release"]).collect();
+    let unknown: Vec<&str> = options(&document).filter(|option| !known.contains(option)).collect();
+    assert!(known.contains(&"--require-gpu") && unknown.is_empty(), "{unknown:?}");
+    assert_eq!(help.matches("A software adapter is not a GPU").count(), 3, "{help}");
+}

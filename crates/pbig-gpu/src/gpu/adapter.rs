@@ -9,6 +9,16 @@ pub fn adapters() -> Vec<wgpu::Adapter> {
     wait::block_on(async { Ok::<_, GpuError>(best_first().await) }).unwrap_or_default()
 }
 
+/// Returns the adapter whose name contains `name`, in any case; without a name the one that [`GpuFinder::new`] uses.
+///
+/// # Errors
+/// As [`GpuFinder::new`], if there is no such adapter.
+///
+/// [`GpuFinder::new`]: super::GpuFinder::new
+pub fn adapter(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
+    wait::block_on(choose(name))
+}
+
 /// Returns all adapters, best first. Of several a browser shows one.
 async fn best_first() -> Vec<wgpu::Adapter> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
@@ -44,7 +54,20 @@ pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError
     let wanted = name.map(str::to_owned).or_else(|| std::env::var("WGPU_ADAPTER_NAME").ok());
     let all = best_first().await;
     let names: Vec<_> = all.iter().map(|adapter| adapter.get_info().name).collect();
-    Ok(all[place_of(wanted.as_deref(), &names)?].clone())
+    let api = std::env::var("WGPU_BACKEND").ok();
+    let place = place_of(wanted.as_deref(), &names)
+        .map_err(|error| blame(error, api.filter(|_| names.is_empty())))?;
+    Ok(all[place].clone())
+}
+
+/// Adds the value of `WGPU_BACKEND` that leaves no adapter.
+fn blame(error: GpuError, api: Option<String>) -> GpuError {
+    match (error, api) {
+        (GpuError::NoAdapter(what), Some(api)) => {
+            GpuError::NoAdapter(format!("{what}; WGPU_BACKEND={api:?} leaves out other APIs"))
+        }
+        (error, _) => error,
+    }
 }
 
 /// Returns the place of the first adapter with the wanted name. A part of the name is enough, in any case.
@@ -94,5 +117,9 @@ mod tests {
         let why = |names: &[String]| place_of(Some("no such"), names).unwrap_err().to_string();
         assert_eq!(why(&names), r#"no GPU adapter named "no such"; found: Iris Xe, llvmpipe (LLVM 15)"#);
         assert_eq!(why(&[]), r#"no GPU adapter named "no such"; found: none"#);
+        let none = place_of(None, &[]).unwrap_err();
+        assert_eq!(blame(none.clone(), None).to_string(), "no GPU adapter; found: none");
+        let blamed = blame(none, Some("dx12".into())).to_string();
+        assert_eq!(blamed, r#"no GPU adapter; found: none; WGPU_BACKEND="dx12" leaves out other APIs"#);
     }
 }

@@ -27,7 +27,7 @@ mod ticks;
 #[cfg_attr(target_arch = "wasm32", path = "wait_web.rs")]
 mod wait;
 
-pub use adapter::{adapters, describe};
+pub use adapter::{adapter, adapters, describe};
 use error::Failure;
 pub use error::GpuError;
 use gpu_plan::GpuPlan;

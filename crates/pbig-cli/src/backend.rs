@@ -1,0 +1,115 @@
+//! Options that choose the backend and its adapter, and what a run on a GPU owes its user.
+
+use pbig_core::{BroadPhase, Config, Finder, PairDevice};
+use pbig_gpu::{GpuFinder, GpuOptions};
+use pbig_harness::options::{BackendOption, shared_gpu};
+use pbig_harness::output::{Failure, warn};
+use rapier_pbig::PbigBroadPhase;
+
+#[derive(clap::Args)]
+pub(crate) struct BackendArgs {
+    /// The backend that searches.
+    #[arg(long = "backend", value_enum, default_value_t)]
+    kind: BackendOption,
+    /// With `--backend gpu`: the adapter, by a part of its name in any case. Without it WGPU_ADAPTER_NAME chooses, or the best is taken.
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// With `--backend gpu`: status 1, without output, unless a GPU does all the work. A software adapter is not a GPU.
+    #[arg(long)]
+    require_gpu: bool,
+}
+
+impl BackendArgs {
+    pub(crate) fn finder(&self) -> Result<Finder, Failure> {
+        let config = Config { backend: self.kind.backend(), ..Config::DEFAULT };
+        Ok(match self.device()? {
+            Some(device) => Finder::with_device(config, device),
+            None => Finder::new(config),
+        })
+    }
+
+    pub(crate) fn broad_phase(&self, margin: f32) -> Result<BroadPhase, Failure> {
+        let config = Config { margin, backend: self.kind.backend(), ..Config::DEFAULT };
+        let made = match self.device()? {
+            Some(device) => BroadPhase::with_device(config, device),
+            None => BroadPhase::new(config),
+        };
+        made.map_err(|error| Failure::Input(format!("--margin: {error}")))
+    }
+
+    pub(crate) fn for_rapier(&self) -> Result<PbigBroadPhase, Failure> {
+        Ok(self.kind.for_rapier_on(self.device()?))
+    }
+
+    /// See [`BackendOption::in_use`].
+    pub(crate) fn in_use(&self, fallback: Option<&str>) -> &'static str {
+        self.kind.in_use(fallback)
+    }
+
+    /// Returns the device to search on, if one is asked for.
+    fn device(&self) -> Result<Option<Box<dyn PairDevice>>, Failure> {
+        self.check_options()?;
+        let Some(name) = &self.adapter else {
+            return Ok(shared_gpu(self.kind.backend(), GpuOptions::DEFAULT));
+        };
+        let gpu = pbig_gpu::adapter(Some(name)).and_then(|adapter| GpuFinder::on(&adapter));
+        let gpu = gpu.map_err(|error| Failure::Input(format!("--adapter {name}: {error}")))?;
+        Ok(Some(Box::new(gpu)))
+    }
+
+    /// Refuses options that would have no effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        let of_gpu = [("--adapter", self.adapter.is_some()), ("--require-gpu", self.require_gpu)];
+        match of_gpu.iter().find(|(_, is_given)| *is_given && self.kind != BackendOption::Gpu) {
+            Some((option, _)) => Err(Failure::Input(format!("{option} needs --backend gpu"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Warns of a software adapter. If a GPU is required and did not do all the work, fails with the reason.
+    pub(crate) fn check_use(&self, adapter: Option<&str>, fallback: Option<&str>) -> Result<(), Failure> {
+        if let (true, Some(why)) = (self.require_gpu, no_gpu(adapter, fallback)) {
+            return Err(Failure::Check(format!("--require-gpu: {why}")));
+        }
+        if let Some(name) = adapter.filter(|name| is_software(name)) {
+            warn(&format!(
+                "{name} is a program on the CPU, slower than --backend cpu; `pbig doctor` says why no GPU is found"
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Returns the reason why the work was not all done by a GPU.
+fn no_gpu(adapter: Option<&str>, fallback: Option<&str>) -> Option<String> {
+    match (fallback, adapter) {
+        (Some(why), _) => Some(format!("the CPU did work: {why}")),
+        (None, None) => Some("there was no work for a GPU".into()),
+        (None, Some(name)) => is_software(name).then(|| format!("{name} is a software adapter")),
+    }
+}
+
+/// Returns true for a description of a software adapter, such as `llvmpipe (LLVM 15) (software, vulkan)`.
+fn is_software(adapter: &str) -> bool {
+    adapter.rsplit_once(" (").is_some_and(|(_, kind)| kind.starts_with("software, "))
+}
+
+/// Returns a line of a summary about the adapter that did the work, if one did.
+pub(crate) fn adapter_line(adapter: Option<&str>) -> String {
+    adapter.map_or(String::new(), |name| format!("\nadapter: {name}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_hardware_that_did_all_the_work_is_a_gpu() {
+        let hardware = Some("NVIDIA H100 (software edition) (discrete, vulkan)");
+        assert_eq!(no_gpu(hardware, None), None);
+        assert_eq!(no_gpu(hardware, Some("it was lost")).as_deref(), Some("the CPU did work: it was lost"));
+        assert_eq!(no_gpu(None, None).as_deref(), Some("there was no work for a GPU"));
+        let software = no_gpu(Some("llvmpipe (LLVM 15) (software, vulkan)"), None);
+        assert_eq!(software.as_deref(), Some("llvmpipe (LLVM 15) (software, vulkan) is a software adapter"));
+    }
+}
