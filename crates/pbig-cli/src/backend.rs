@@ -59,11 +59,18 @@ impl BackendArgs {
 
     /// Refuses options that would have no effect.
     fn check_options(&self) -> Result<(), Failure> {
-        let of_gpu = [("--adapter", self.adapter.is_some()), ("--require-gpu", self.require_gpu)];
-        match of_gpu.iter().find(|(_, is_given)| *is_given && self.kind != BackendOption::Gpu) {
-            Some((option, _)) => Err(Failure::Input(format!("{option} needs --backend gpu"))),
-            None => Ok(()),
+        match self.option_of_gpu() {
+            Some(option) if self.kind != BackendOption::Gpu => {
+                Err(Failure::Input(format!("{option} needs --backend gpu")))
+            }
+            _ => Ok(()),
         }
+    }
+
+    /// Returns an option that only a GPU has, if one is given.
+    pub(crate) fn option_of_gpu(&self) -> Option<&'static str> {
+        let of_gpu = [("--adapter", self.adapter.is_some()), ("--require-gpu", self.require_gpu)];
+        of_gpu.into_iter().find_map(|(option, is_given)| is_given.then_some(option))
     }
 
     /// Warns of a software adapter. If a GPU is required and did not do all the work, fails with the reason.

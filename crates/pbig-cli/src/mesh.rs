@@ -128,9 +128,10 @@ fn check_files(args: &Args, inputs: &[&Path]) -> Result<Vec<PathBuf>, Failure> {
 
 /// Returns the file for pairs of these kinds: `out-ee.npy` beside `out.npy`.
 fn for_kinds(output: &Path, Kinds(kinds): &Kinds) -> PathBuf {
-    let [stem, ending] =
-        [output.file_stem(), output.extension()].map(|part| part.unwrap_or_default().display());
-    output.with_file_name(format!("{stem}-{kinds}.{ending}"))
+    let mut name = output.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{kinds}."));
+    name.push(output.extension().unwrap_or_default());
+    output.with_file_name(name)
 }
 
 fn find(args: &Args, path: &Path, kinds: &Kinds, elements: &MeshElements) -> Result<Found, Failure> {

@@ -58,9 +58,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 fn refuse_what_stock_ignores(args: &Args) -> Result<(), Failure> {
-    let what =
-        "--check is for pbig, not for rapier's own broad phase: leave out --check or --broad-phase stock";
-    if args.check && args.broad_phase == "stock" { Err(Failure::Input(what.into())) } else { Ok(()) }
+    let ignored = if args.check { Some("--check") } else { args.backend.option_of_gpu() };
+    match ignored {
+        Some(option) if args.broad_phase == "stock" => Err(Failure::Input(format!(
+            "{option} is for pbig, not for rapier's own broad phase: leave out {option} or --broad-phase stock"
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Runs the scene and prints the results. `ours` returns the broad phase, if it is pbig's.

@@ -72,6 +72,11 @@ fn what_stock_would_ignore_is_refused() {
     let line = line(&[&stock[..], &["--check"]].concat());
     let wanted = "leave out --check or --broad-phase stock";
     assert!(line.starts_with("--check is for pbig") && line.ends_with(wanted), "{line}");
+    let line = self::line(&[&stock[..], &["--require-gpu"]].concat());
+    assert!(
+        line.starts_with("--require-gpu is for pbig") && line.contains("leave out --require-gpu or"),
+        "{line}"
+    );
 }
 
 /// Returns the words of a text that begin with two hyphens.
