@@ -139,10 +139,10 @@ fn report<B: BroadPhase>(
     print(&format!(
         "{}: {bodies} bodies, {colliders} colliders, {steps} steps with the {} broad phase\n\
          a step: broad phase {broad_phase}, all {step}\n\
-         {pairs} pairs at the end; {added} added, {removed} removed\n{}{note}{}",
+         {pairs} pairs at the end; {added} added, {removed} removed{}{note}{}",
         args.scene,
         args.broad_phase,
-        checker.map_or(String::new(), check_line),
+        checker.map_or(String::new(), |checker| format!("\n{}", check_line(checker))),
         adapter_line(ours.and_then(PbigBroadPhase::device_name)),
     ))
 }

@@ -41,7 +41,7 @@ fn the_summary_names_the_adapter_and_software_is_warned_of() {
         let output = on_gpu(folder.path(), command, &[]);
         let [text, aside] =
             [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).expect("UTF-8"));
-        assert!(text.contains(&format!("\nadapter: {name}\n")), "{text}");
+        assert!(text.contains(&format!("\nadapter: {name}\n")) && !text.contains("\n\n"), "{text}");
         let warning = format!("pbig: warning: {name} is a program on the CPU, slower than --backend cpu");
         // Nothing else, such as a driver's complaint.
         assert_eq!(
