@@ -2,7 +2,7 @@
 
 use super::codes::{MAX_STEP, MIN_STEP, Steps};
 use super::sse::corners;
-use super::{BLOCK, Eight, Primitives};
+use super::{BLOCK, Eight, Simd};
 use crate::Aabb;
 use std::arch::x86_64::*;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -54,7 +54,7 @@ macro_rules! by {
     };
 }
 
-impl Primitives for Avx2 {
+impl Simd for Avx2 {
     type Row = __m256i;
 
     #[inline]

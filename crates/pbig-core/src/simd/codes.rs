@@ -53,7 +53,7 @@ fn round_to_i32(x: f64) -> i32 {
     (x + SHIFT).to_bits() as i32
 }
 
-/// See [`Primitives::key`](super::Primitives::key).
+/// See [`Simd::key`](super::Simd::key).
 #[inline(always)]
 pub(super) fn key(dims: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32 {
     let mut cell = point.map(|step| step >> shift);

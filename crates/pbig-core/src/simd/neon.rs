@@ -1,6 +1,6 @@
 //! Primitives of NEON, which all 64-bit ARM processors have.
 
-use super::{BLOCK, Eight, Primitives};
+use super::{BLOCK, Eight, Simd};
 use crate::Aabb;
 use std::arch::aarch64::*;
 
@@ -25,7 +25,7 @@ fn zip(a: Row, b: Row, of: impl Fn(uint32x4_t, uint32x4_t) -> uint32x4_t) -> Row
     [of(a[0], b[0]), of(a[1], b[1])]
 }
 
-impl Primitives for Neon {
+impl Simd for Neon {
     type Row = Row;
 
     #[inline(always)]

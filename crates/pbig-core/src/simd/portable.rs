@@ -1,6 +1,6 @@
 //! Primitives in plain Rust, which a compiler turns into whatever vectors its target has.
 
-use super::{BLOCK, Eight, Primitives};
+use super::{BLOCK, Eight, EightBoxes, Simd};
 use crate::Aabb;
 
 /// Any processor.
@@ -23,7 +23,7 @@ fn fold(row: Eight, of: impl Fn(f32, f32) -> f32) -> f32 {
     of(of(four[0], four[2]), of(four[1], four[3]))
 }
 
-impl Primitives for Portable {
+impl Simd for Portable {
     type Row = Eight;
 
     /// Not inlined beside the code for other instructions.
@@ -142,10 +142,60 @@ impl Primitives for Portable {
         rows.map(|row| fold(row, |a, b| if a > b { a } else { b }))
     }
 
-    /// Without vectors, a network of 24 exchanges takes longer.
     #[inline(always)]
     fn sorted(self, mut row: Eight) -> Eight {
         row.sort_unstable();
         row
     }
+
+    /// Sorts no more than it has to, as the next ones do.
+    #[inline(always)]
+    fn sorted_short(self, row: &Eight, len: usize) -> Eight {
+        let mut sorted = *row;
+        sorted[..len].sort_unstable();
+        sorted
+    }
+
+    #[inline(always)]
+    fn nearest(self, keys: &[f32; BLOCK], limits: &[f32; BLOCK]) -> Option<usize> {
+        let lanes = (0..BLOCK).filter(|lane| keys[*lane] <= limits[*lane]);
+        lanes.min_by_key(|lane| word(keys, *lane))
+    }
+
+    #[inline(always)]
+    fn farthest_first(
+        self,
+        keys: &[f32; BLOCK],
+        limits: &[f32; BLOCK],
+        values: &Eight,
+    ) -> ([f32; BLOCK], Eight, usize) {
+        let (mut order, mut count) = ([0; BLOCK], 0);
+        for lane in (0..BLOCK).filter(|lane| keys[*lane] <= limits[*lane]) {
+            let mut at = count;
+            while at > 0 && word(keys, order[at - 1]) < word(keys, lane) {
+                order[at] = order[at - 1];
+                at -= 1;
+            }
+            (order[at], count) = (lane, count + 1);
+        }
+        (order.map(|lane| keys[lane]), order.map(|lane| values[lane]), count)
+    }
+
+    #[inline(always)]
+    fn overlaps_eight(self, boxes: &EightBoxes, aabb: &Aabb) -> u32 {
+        let mut overlaps = [1; BLOCK];
+        for k in 0..3 {
+            for lane in 0..BLOCK {
+                let meets = (aabb.min[k] <= boxes[k + 3][lane]) & (boxes[k][lane] <= aabb.max[k]);
+                overlaps[lane] &= u32::from(meets);
+            }
+        }
+        (0..BLOCK).fold(0, |mask, lane| mask | overlaps[lane] << lane)
+    }
+}
+
+/// Returns an integer in the order of keys that are not negative. Its last bits are the lane, so that no two are equal.
+#[inline(always)]
+fn word(keys: &[f32; BLOCK], lane: usize) -> u32 {
+    keys[lane].to_bits() & !(BLOCK as u32 - 1) | lane as u32
 }

@@ -1,11 +1,117 @@
-//! Kernels of the inner loops, for every instruction set.
+//! What an instruction set has, and the kernels of the inner loops on it.
 
-use super::codes::{APART, SET_BITS, TOMBSTONE};
-use super::{BLOCK, Eight, EightBoxes, Primitives};
+use super::codes::{self, APART, SET_BITS, TOMBSTONE};
+use super::{BLOCK, Eight, EightBoxes, Steps};
 use crate::Aabb;
 
-/// Kernels of the inner loops.
-pub(crate) trait Simd: Primitives {
+/// Instructions of a processor: primitives, and kernels on these, which an instruction set may have in another way. A value is a proof that the
+/// processor has the instructions.
+pub(crate) trait Simd: Copy {
+    /// Eight numbers of 32 bits: integers, floats by their bits, or a mask, in which all bits of a lane are equal.
+    type Row: Copy;
+
+    /// Calls a function that is inlined here, compiled for the instructions.
+    fn run<T>(self, work: impl FnOnce() -> T) -> T;
+
+    /// Reads eight numbers.
+    fn load(self, row: &Eight) -> Self::Row;
+
+    /// Returns the eight numbers of a row.
+    fn store(self, row: Self::Row) -> Eight;
+
+    /// Returns a row of eight equal numbers.
+    fn splat(self, number: u32) -> Self::Row;
+
+    /// Returns the eight bytes of a word as numbers.
+    fn widen(self, bytes: u64) -> Self::Row;
+
+    /// Adds integers, and wraps.
+    fn add(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns the bits that are set in both rows.
+    fn and(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns the bits that are set in one row at least.
+    fn or(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns the bits that are not set.
+    fn not(self, a: Self::Row) -> Self::Row;
+
+    /// Returns the lesser integers, without sign.
+    fn min(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns the greater integers, without sign.
+    fn max(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns a mask of the integers that are equal.
+    fn equal(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns a mask of the floats that are at most the other one. No number is at most a NaN.
+    fn at_most_f32(self, a: Self::Row, b: Self::Row) -> Self::Row;
+
+    /// Returns the numbers of one row where a mask is set, and those of another elsewhere.
+    fn select(self, mask: Self::Row, set: Self::Row, unset: Self::Row) -> Self::Row;
+
+    /// Returns the numbers that lie in the named lanes. Only the last three bits of a name count.
+    fn permute(self, row: Self::Row, lanes: Self::Row) -> Self::Row;
+
+    /// Returns a bit for each lane of a mask.
+    fn bits(self, mask: Self::Row) -> u32;
+
+    /// Returns the least of eight integers, without sign.
+    fn least(self, row: Self::Row) -> u32;
+
+    /// Adds a number to each of eight codes. Returns a bit for each sum that has none of `bits`.
+    fn lacks_bits(self, add: u64, bits: u64, codes: &[u64; BLOCK]) -> u32;
+
+    /// Returns eight boxes axis by axis.
+    fn transpose(self, boxes: [&Aabb; BLOCK]) -> [Self::Row; 6];
+
+    /// Returns the least float of each row. No float is a NaN.
+    fn lowest(self, rows: [Self::Row; 3]) -> [f32; 3];
+
+    /// Returns the greatest float of each row. No float is a NaN.
+    fn highest(self, rows: [Self::Row; 3]) -> [f32; 3];
+
+    /// Returns both corners of a box in steps: `scale` of them in a length unit, from `origin` on.
+    #[inline(always)]
+    fn steps(self, origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps) {
+        (codes::steps(origin, scale, &aabb.min), codes::steps(origin, scale, &aabb.max))
+    }
+
+    /// Returns the number, row by row, of the cell of a point. A cell has `1 << shift` steps, and there are `dims` of them by axis. The
+    /// point is wrapped into these, or clamped into those that have neighbours on both sides.
+    #[inline(always)]
+    fn key(self, dims: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32 {
+        codes::key(dims, shift, wraps, point)
+    }
+
+    /// Returns true for a valid box with these extents at most.
+    #[inline(always)]
+    fn fits(self, most: &[f32; 3], aabb: &Aabb) -> bool {
+        let extent: [f32; 3] = std::array::from_fn(|k| aabb.max[k] - aabb.min[k]);
+        let fits = |k: usize| (extent[k] >= 0.0) & (extent[k] <= most[k]);
+        fits(0) & fits(1) & fits(2)
+    }
+
+    /// Returns the code of a box.
+    #[inline(always)]
+    fn code(self, low: Steps, high: Steps) -> u64 {
+        codes::code(low, high)
+    }
+
+    /// Returns eight integers, sorted, by a network of six steps.
+    #[inline(always)]
+    fn sorted(self, row: Self::Row) -> Self::Row {
+        const PAIRS: [Eight; 2] = [[1, 0, 3, 2, 5, 4, 7, 6], upper(0b1010_1010)];
+        const TWOS: [Eight; 2] = [[2, 3, 0, 1, 6, 7, 4, 5], upper(0b1100_1100)];
+        const FOURS: [Eight; 2] = [[3, 2, 1, 0, 7, 6, 5, 4], upper(0b1100_1100)];
+        const EIGHT: [Eight; 2] = [[7, 6, 5, 4, 3, 2, 1, 0], upper(0b1111_0000)];
+        let row = exchange(self, exchange(self, row, &PAIRS), &FOURS);
+        let row = exchange(self, exchange(self, row, &PAIRS), &EIGHT);
+        exchange(self, exchange(self, row, &TWOS), &PAIRS)
+    }
+
     /// Returns a bit for each of eight codes: set if the two boxes may overlap. Tombstones never do.
     #[inline(always)]
     fn test(self, query: u64, codes: &[u64; BLOCK]) -> u32 {
@@ -122,17 +228,32 @@ pub(crate) trait Simd: Primitives {
     }
 }
 
-impl<P: Primitives> Simd for P {}
+/// Returns a mask of the lanes whose bits are set.
+const fn upper(bits: u32) -> Eight {
+    let (mut mask, mut lane) = ([0; BLOCK], 0);
+    while lane < BLOCK {
+        mask[lane] = (bits >> lane & 1).wrapping_neg();
+        lane += 1;
+    }
+    mask
+}
+
+/// Compares each number with a partner's: the upper lanes get the greater one, the others the lesser one.
+#[inline(always)]
+fn exchange<S: Simd>(simd: S, row: S::Row, [partners, upper]: &[Eight; 2]) -> S::Row {
+    let other = simd.permute(row, simd.load(partners));
+    simd.select(simd.load(upper), simd.max(row, other), simd.min(row, other))
+}
 
 /// Reads eight floats.
 #[inline(always)]
-fn floats<P: Primitives>(simd: P, row: &[f32; BLOCK]) -> P::Row {
+fn floats<S: Simd>(simd: S, row: &[f32; BLOCK]) -> S::Row {
     simd.load(bytemuck::cast_ref(row))
 }
 
 /// Reads the first `len` numbers of a row. The largest number takes the place of the others.
 #[inline(always)]
-fn limited<P: Primitives>(simd: P, row: &Eight, len: usize) -> P::Row {
+fn limited<S: Simd>(simd: S, row: &Eight, len: usize) -> S::Row {
     let behind = simd.load(&BEHIND[len]);
     simd.or(simd.load(row), behind)
 }
@@ -150,7 +271,7 @@ static BEHIND: [Eight; BLOCK + 1] = {
 
 /// Returns words in the order of eight keys with the lane in the last bits: all bits for a key beyond its limit.
 #[inline(always)]
-fn words<P: Primitives>(simd: P, keys: &[f32; BLOCK], limits: &[f32; BLOCK]) -> P::Row {
+fn words<S: Simd>(simd: S, keys: &[f32; BLOCK], limits: &[f32; BLOCK]) -> S::Row {
     let keys = floats(simd, keys);
     let word = simd.or(simd.and(keys, simd.splat(!7)), simd.load(&[0, 1, 2, 3, 4, 5, 6, 7]));
     simd.select(simd.at_most_f32(keys, floats(simd, limits)), word, simd.splat(u32::MAX))
