@@ -18,7 +18,7 @@ impl PairDevice for Thread {
     fn find_all(&mut self, all: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), DeviceFailure> {
         let any = vec![ProxyFilter::ALL; all.boxes.len()];
         found.valid = all.boxes.iter().filter(|one| one.is_valid()).count() as u32;
-        found.pairs = pairs(all.boxes, all.filters.unwrap_or(&any))?;
+        found.pairs = pairs(all.boxes, all.filters.unwrap_or(&any))?.into();
         Ok(())
     }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Tests the kernels on drivers and compilers beside the machine's own. None needs a GPU.
+# Tests the kernels on drivers and compilers beside the machine's own, none of which needs a GPU, and on its own.
 #   scripts/gpu.sh [--no-setup] [NAME...]     without a name: all
 #   swiftshader   the suite's GPU part on SwiftShader, the Vulkan driver in Chromium
 #   dawn          the pipeline on Dawn under node, also with workgroups and lanes in other orders
@@ -8,6 +8,8 @@
 #   amd           AMD's compiler in Mesa: registers, waves and spills of each kernel; nothing may spill
 #   table         the tables of the two compilers as docs/benchmarks/results/gpu-compilers.csv
 #   validation    the suite's GPU part under Khronos' validation layer: no message
+#   device        the suite's GPU part and every GPU benchmark on this machine's adapter, in at most eight minutes after the build.
+#                 The tables go to out/gpu/device; a software adapter runs small sizes. It runs only if it is named.
 # What lacks a tool is left out by name.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -176,6 +178,37 @@ run_validation() {
         { echo "the layer is silent" && return 1; }
     # One thread: the layer once crashed where several made devices.
     validated ${enable}_SYNCHRONIZATION_VALIDATION_EXT $suite --test-threads=1
+}
+
+# Seconds for all that `device` measures and tests.
+device_seconds=480
+
+# on_device NAME COMMAND...: runs a command in what is left of the time, and notes its seconds and its status.
+on_device() {
+    local name=$1 start=$SECONDS status=0
+    shift
+    step timeout $((device_seconds - SECONDS > 1 ? device_seconds - SECONDS : 1)) "$@" >"$out/device/$name.log" 2>&1 || status=$?
+    echo "$name,$((SECONDS - start)),$status" | tee -a "$out/device/steps.csv"
+    [ "$status" = 0 ] || faults=$((faults + 1))
+}
+
+run_device() {
+    local programs quick=() tests=(kernels:: gpu::) faults=0
+    programs=$(target_folder)/release
+    step cargo build --release -p pbig-cli -p pbig-studies -p pbig-examples --example resident
+    step cargo test --release -p pbig-tests --test suite --no-run
+    rm -rf "$out/device" && mkdir -p "$out/device"
+    "$programs/pbig" doctor >"$out/device/doctor.txt"
+    # A software adapter takes minutes for all tests.
+    ! grep -q '(software' "$out/device/doctor.txt" || quick=(--quick) tests=(gpu::resident)
+    echo step,seconds,status >"$out/device/steps.csv"
+    SECONDS=0
+    on_device resident "$programs/examples/resident"
+    on_device bench "$programs/pbig" bench gpu "${quick[@]}" --write "$out/device"
+    on_device papers_quick "$programs/pbig-studies" papers --quick --write "$out/device"
+    on_device suite cargo test --release -p pbig-tests --test suite -- "${tests[@]}"
+    [ ${#quick[@]} -gt 0 ] || on_device papers "$programs/pbig-studies" papers --write "$out/device"
+    [ "$faults" = 0 ]
 }
 
 setup=true

@@ -134,8 +134,9 @@ step_examples() {
     step cargo run --release --bin pbig -- pairs examples/boxes.csv
     step cargo run --release --bin pbig -- replay examples/frames.npy
     step cargo run --release --bin pbig -- simulate --scene pile --check --backend gpu --bodies 1500 --steps 20
-    has_gpu || { left_out "there is no GPU adapter for own_device" && return; }
+    has_gpu || { left_out "there is no GPU adapter for own_device and resident" && return; }
     step cargo run --release --example own_device
+    step cargo run --release --example resident
 }
 
 step_docs() {

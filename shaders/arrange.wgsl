@@ -9,10 +9,7 @@
 
 @compute @workgroup_size(1)
 fn arrange() {
-    let fits = counters.entries <= params.entry_capacity && counters.slots <= params.slot_capacity
-        && counters.small_items <= params.small_capacity && counters.large_items <= params.large_capacity
-        && (params.most_tests == 0xffffffffu
-            || (counters.tests <= params.most_tests && counters.too_many_tests == 0u));
+    let fits = lists_fit() && tests_fit();
     write_dispatch(0u, select(0u, min(counters.small_items, chunk.small_items), fits));
     write_dispatch(3u, select(0u, min(counters.large_items, chunk.large_items), fits));
 }

@@ -57,6 +57,10 @@ pub enum Buffer {
     LongRows,
     /// Number of pairs in each window of the long rows.
     Windows,
+    /// Sizes of boxes that live on the device, and a sample of them.
+    Summary,
+    /// Number of pairs that stay on the device, and whether they are all.
+    PairCount,
 }
 
 impl Buffer {
@@ -82,6 +86,8 @@ impl Buffer {
             Self::Grouped => "grouped",
             Self::LongRows => "long_rows",
             Self::Windows => "windows",
+            Self::Summary => "summary",
+            Self::PairCount => "pair_count",
         }
     }
 
@@ -126,6 +132,7 @@ impl Kernel {
 const TYPES: &str = include_str!("shared/types.wgsl");
 const FLOATS: &str = include_str!("shared/floats.wgsl");
 const CELLS: &str = include_str!("shared/cells.wgsl");
+const FITS: &str = include_str!("shared/fits.wgsl");
 const SCANNED: &str = include_str!("shared/scanned.wgsl");
 const ENDS: &str = include_str!("shared/ends.wgsl");
 const DISPATCH: &str = include_str!("shared/dispatch.wgsl");
@@ -154,6 +161,8 @@ macro_rules! kernels {
 }
 
 kernels! {
+    /// Plan: measures boxes that live on the device.
+    MEASURE Map "measure" [FLOATS] (Params, Boxes, Summary);
     /// Map: computes the cells and the level of each box, and counts the residents of each cell.
     LOCATE Map "locate" [FLOATS, CELLS] (Params, Boxes, Located, Cells, Counters);
     /// Map: counts the visitors of each cell.
@@ -167,7 +176,7 @@ kernels! {
     /// Map: scatters boxes into cells.
     SCATTER Map "scatter" [ENDS, CELLS] (Params, Located, Sums, Counters, Cells, Entries);
     /// Schedule: computes the sizes of the dispatches that follow.
-    ARRANGE Map "arrange" [DISPATCH] (Params, Chunk, Counters, Dispatches);
+    ARRANGE Map "arrange" [FITS, DISPATCH] (Params, Chunk, Counters, Dispatches);
     /// Check: tests the pairs of small cells.
     CHECK_SMALL Check "check_small" [FLOATS, BLOCK_SCAN, PAIR_INDEX, EMIT]
         (Params, Chunk, Boxes, Filters, Entries, Counters, Slots, SmallItems, Totals, Out);
@@ -176,6 +185,8 @@ kernels! {
         (Params, Chunk, Boxes, Filters, Entries, Counters, LargeItems, Totals, Out);
     /// Check: tests all pairs, without a grid.
     CHECK_ALL Check "check_all" [FLOATS, PAIR_INDEX, EMIT] (Params, Chunk, Boxes, Filters, Totals, Out);
+    /// Check: says how many pairs stay on the device, and whether they are all.
+    CONCLUDE Check "conclude" [FITS] (Params, Chunk, Counters, Totals, PairCount);
     /// Sort: computes the sizes of the dispatches that follow.
     ARRANGE_ROWS Sort "arrange_rows" [ROWS, DISPATCH] (Params, Chunk, Counters, Totals, Dispatches, LongRows);
     /// Sort: counts the pairs of each first box.
@@ -183,7 +194,8 @@ kernels! {
     /// Sort: groups the pairs by first box.
     PLACE_PAIRS Sort "place_pairs" [ENDS, LEADERS] (Totals, Out, Sums, Rows, Grouped);
     /// Sort: orders short rows, and cuts long ones into pieces.
-    RANK_PAIRS Sort "rank_pairs" [ENDS, ROWS] (Params, Totals, Sums, Rows, Grouped, LongRows, Windows, Out);
+    RANK_PAIRS Sort "rank_pairs" [ENDS, ROWS]
+        (Params, Chunk, Totals, Sums, Rows, Grouped, LongRows, Windows, Out);
     /// Sort: groups the pairs of long rows by window.
     PLACE_WINDOWS Sort "place_windows" [ROWS, PIECES, BLOCK_SCAN] (Params, Grouped, LongRows, Windows, Out);
     /// Sort: orders the windows of long rows.

@@ -1,14 +1,15 @@
-// Sort, step 4: writes each pair of a short row to its place, behind the pairs of the row whose second box is smaller. Counts
+// Sort, step 4, for a chunk of the pairs: writes each pair of a short row to its place, behind the pairs of the row whose second box is smaller. Counts
 // the pairs of long rows by window, and cuts these rows into pieces.
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> totals: Totals;
-@group(0) @binding(2) var<storage, read> sums: array<u32>;
-@group(0) @binding(3) var<storage, read> rows: array<u32>;
-@group(0) @binding(4) var<storage, read> grouped: array<u32>;
-@group(0) @binding(5) var<storage, read_write> long_rows: array<atomic<u32>>;
-@group(0) @binding(6) var<storage, read_write> windows: array<atomic<u32>>;
-@group(0) @binding(7) var<storage, read_write> out: array<u32>;
+@group(0) @binding(1) var<uniform> chunk: Chunk;
+@group(0) @binding(2) var<storage, read> totals: Totals;
+@group(0) @binding(3) var<storage, read> sums: array<u32>;
+@group(0) @binding(4) var<storage, read> rows: array<u32>;
+@group(0) @binding(5) var<storage, read> grouped: array<u32>;
+@group(0) @binding(6) var<storage, read_write> long_rows: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read_write> windows: array<atomic<u32>>;
+@group(0) @binding(8) var<storage, read_write> out: array<u32>;
 
 // Returns the end of a row: the start of the next one.
 fn end_of(row: u32) -> u32 {
@@ -30,7 +31,7 @@ fn add_piece(start: u32, end: u32, index: u32) {
 
 @compute @workgroup_size(LANES)
 fn rank_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let i = linear(group) * LANES + lane;
+    let i = chunk.first_pair + linear(group) * LANES + lane;
     if 2u * i >= totals.words.x {
         return;
     }

@@ -22,7 +22,7 @@ impl RemoteDevice {
 impl PairDevice for RemoteDevice {
     fn find_all(&mut self, all: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), DeviceFailure> {
         let declined = || DeviceFailure::Declined("the GPU declined the boxes: the CPU does the work".into());
-        found.pairs = (self.find_all)(all.boxes, all.filters).ok_or_else(declined)?;
+        found.pairs = (self.find_all)(all.boxes, all.filters).ok_or_else(declined)?.into();
         found.valid = all.boxes.iter().filter(|one| one.is_valid()).count() as u32;
         if found.pairs.len() as u64 > all.max_pairs { Err(DeviceFailure::TooManyPairs) } else { Ok(()) }
     }

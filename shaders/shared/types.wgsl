@@ -17,6 +17,8 @@ const BITS = 4u;
 const SORTED = 8u;
 // The checks count redundant tests and overlaps.
 const COUNTED = 16u;
+// There is no plan, so nothing is searched: the boxes live on the device, and were not measured yet.
+const UNPLANNED = 32u;
 
 // An AABB whose coordinates are integers in the order of the floats. Comparisons of integers are exact on every device,
 // whatever it does to denormals, infinities and NaN. An invalid box has all of `low` above all of `high`.
@@ -78,7 +80,7 @@ struct Params {
     level: array<Level, MAX_LEVELS>,
 }
 
-// Range of the work items of one dispatch of the check kernels.
+// Range of the work of one dispatch.
 struct Chunk {
     first_small: u32,
     small_items: u32,
@@ -86,7 +88,8 @@ struct Chunk {
     large_items: u32,
     // Capacity of the output, in words.
     word_capacity: u32,
-    unused: u32,
+    // The first of the grouped pairs that are ranked.
+    first_pair: u32,
     // Number of pairs after which the call ends in an error: low and high half.
     pairs_left: vec2<u32>,
 }
@@ -151,6 +154,26 @@ struct Totals {
     overlaps: vec2<u32>,
     sorted: u32,
     unused: u32,
+}
+
+// Values of PairCount.status: all pairs are there; there was no plan yet; a list or the pairs did not fit; the plan was made for
+// other boxes, and makes too many tests. Unless all are there, the buffer of pairs holds nothing of use.
+const COMPLETE = 0u;
+const NOT_PLANNED = 1u;
+const TOO_LARGE = 2u;
+const PLAN_REFUSED = 3u;
+
+// The result of a search whose pairs stay on the device.
+struct PairCount {
+    // Number of pairs in the buffer; 0 unless all are there.
+    pairs: u32,
+    status: u32,
+    // Number of pairs that were found, whether they fit or not; at most 2^32 - 1.
+    needed: u32,
+    unused0: u32,
+    // Arguments of an indirect dispatch of LANES lanes for each workgroup, and at least one lane for each pair.
+    dispatch: array<u32, 3>,
+    unused1: u32,
 }
 
 // Bits of an entry of a cell: the box, an unused bit, and for each axis a bit that is set if this is the box's lowest cell there.

@@ -2,6 +2,7 @@
 //! an adapter, which may be software, and fails without one.
 
 mod failures;
+mod resident;
 mod turns;
 mod work;
 

@@ -5,9 +5,9 @@ use crate::pair_device::{PairDevice, SearchRequest};
 use crate::pairs::{Grouping, Groups};
 use crate::policy::Work;
 use crate::report::{Clock, Report, stage};
+use crate::search::DeviceSlot;
 use crate::search::Outcome;
 use crate::search::{AllPairs, Request, Store};
-use crate::search::{DeviceSlot, are_in_order};
 use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Order, Pair, ProxyFilter};
 
 mod between;
@@ -168,8 +168,9 @@ impl Finder {
         if !self.add(outcome)? {
             return Ok(false);
         }
-        self.pairs = found;
-        if grouping.is_some() && !are_in_order(&self.pairs) {
+        let is_in_order = found.is_in_order();
+        self.pairs = found.into_vec();
+        if grouping.is_some() && !is_in_order {
             self.all_pairs.take(&mut self.pairs, grouping);
             self.emit(grouping);
         }

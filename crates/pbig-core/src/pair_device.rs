@@ -1,6 +1,6 @@
 //! The door for other processors: a [`PairDevice`] finds pairs for a [`crate::Finder`] or a [`crate::BroadPhase`].
 
-use crate::{Aabb, Checks, DeviceReport, Pair, ProxyFilter};
+use crate::{Aabb, Checks, DeviceReport, PairList, ProxyFilter};
 use std::fmt;
 
 /// A processor that finds pairs, such as a GPU. `pbig-gpu` has one, and `examples/other_device.rs` a small one.
@@ -64,7 +64,7 @@ pub struct SearchRequest<'a> {
 #[non_exhaustive]
 pub struct DeviceFound {
     /// The pairs.
-    pub pairs: Vec<Pair>,
+    pub pairs: PairList,
     /// Number of valid boxes.
     pub valid: u32,
     /// The device's plan in words, for [`crate::Plan`]; none if it tested every pair.

@@ -3,9 +3,8 @@
 //! Words that break the format give an error, never a panic: the output of a device is untrusted input.
 
 use crate::layout::{BOX_BITS, LANES};
-use pbig_core::Pair;
-use pbig_core::internal::{self as parallel, SharedSlice};
-use std::mem::MaybeUninit;
+use pbig_core::internal as parallel;
+use pbig_core::{BoxIds, Pair, PairList};
 use std::ops::Range;
 
 /// Words that break the format.
@@ -24,64 +23,42 @@ pub const PLAIN: u32 = 1 << 31;
 /// Number of words that a thread decodes at a time.
 const PIECE: usize = 1 << 15;
 
-/// Appends plain pairs: two ids each, the smaller first. If `is_sorted`, they must be in order, also after those in the list.
+/// Appends plain pairs: two ids each, the smaller first. Each is read once. If `is_sorted`, the list must be in order afterwards.
 ///
 /// # Errors
-/// If the number of words is odd, a pair is not `a < b < boxes`, or the order is broken. Then some pairs were appended.
-pub fn plain(words: &[u32], boxes: u32, is_sorted: bool, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
-    let given = whole_pairs(words)?;
-    let (start, last) = (pairs.len(), pairs.last().copied());
-    let pieces: Vec<&[Pair]> = given.chunks(2 * PIECE).collect();
-    pairs.reserve(given.len());
-    let places = SharedSlice::new(&mut pairs.spare_capacity_mut()[..given.len()]);
-    let are_good = parallel::map(pieces.len(), |i| {
-        let (at, piece) = (2 * PIECE * i, pieces[i]);
-        // SAFETY: the place is inside the reserved memory, and no other piece has it.
-        let copied = copy_into(unsafe { places.part(at..at + piece.len()) }, piece);
-        let before = i.checked_sub(1).map_or(last.as_ref(), |i| pieces[i].last());
-        let is_in_order = || copied.is_sorted_by(|a, b| a < b) && before < copied.first();
-        // Without an early end, so that the compiler uses SIMD.
-        let are_pairs = copied.iter().fold(true, |all, pair| all & (pair.a < pair.b) & (pair.b < boxes));
-        are_pairs && (!is_sorted || is_in_order())
-    });
-    // SAFETY: as many pairs were reserved, and written.
-    unsafe { pairs.set_len(start + given.len()) };
-    let faulty = are_good.iter().position(|is_good| !is_good);
-    faulty.map_or(Ok(()), |i| Err(fault_of(pieces[i], boxes, 4 * PIECE * i)))
-}
-
-/// Copies pairs, and returns the copy. This is read from then on: the words may lie in memory of a device, which is slow.
-fn copy_into<'a>(place: &'a mut [MaybeUninit<Pair>], pairs: &[Pair]) -> &'a [Pair] {
-    for (place, pair) in place.iter_mut().zip(pairs) {
-        place.write(*pair);
-    }
-    // SAFETY: a pair was written into each place: both are equally long.
-    unsafe { std::slice::from_raw_parts(place.as_ptr().cast(), place.len()) }
-}
-
-/// Returns the error of a piece whose first word is `at`.
-fn fault_of(piece: &[Pair], boxes: u32, at: usize) -> DecodeError {
-    let fault = (at..).step_by(2).zip(piece).find_map(|(at, pair)| checked(*pair, boxes, at).err());
-    fault.unwrap_or(DecodeError { what: "pairs out of order", at })
-}
-
-/// Returns the pair at a word, or an error if it is none.
-fn checked(pair: Pair, boxes: u32, at: usize) -> Result<Pair, DecodeError> {
-    let is_pair = pair.a < pair.b && pair.b < boxes;
-    is_pair.then_some(pair).ok_or(DecodeError { what: "not a < b < boxes", at })
-}
-
-fn whole_pairs(words: &[u32]) -> Result<&[Pair], DecodeError> {
+/// If the number of words is odd, a pair is not `a < b < boxes`, or the order is broken. If it is the order, the pairs were appended.
+pub fn plain(
+    words: &[u32],
+    ids: BoxIds<'_>,
+    is_sorted: bool,
+    pairs: &mut PairList,
+) -> Result<(), DecodeError> {
     let half = DecodeError { what: "half a pair", at: words.len() };
-    bytemuck::try_cast_slice(words).map_err(|_| half)
+    let given: &[Pair] = bytemuck::try_cast_slice(words).map_err(|_| half)?;
+    append(given, ids, pairs)?;
+    if is_sorted && !pairs.is_in_order() {
+        return Err(DecodeError { what: "pairs out of order", at: words.len() });
+    }
+    Ok(())
+}
+
+/// Appends pairs, and checks them.
+fn append(given: &[Pair], ids: BoxIds<'_>, pairs: &mut PairList) -> Result<(), DecodeError> {
+    let fault = |i| DecodeError { what: "not a < b < boxes", at: 2 * i };
+    pairs.append_checked(given, ids).map_err(fault)
 }
 
 /// Appends the pairs of records. They name boxes by their index in `entries`, the boxes of all cells.
 ///
 /// # Errors
 /// If a record is cut off, or names an entry or a box that does not exist. Then nothing useful was appended.
-pub fn records(words: &[u32], entries: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
-    let pieces = pieces(words)?;
+pub fn records(
+    words: &[u32],
+    entries: &[u32],
+    ids: BoxIds<'_>,
+    pairs: &mut PairList,
+) -> Result<(), DecodeError> {
+    let (pieces, boxes) = (pieces(words)?, ids.boxes());
     let decoded = parallel::map(pieces.len(), |i| {
         let Range { start: at, end } = pieces[i];
         // Most words have two or three pairs.
@@ -92,10 +69,7 @@ pub fn records(words: &[u32], entries: &[u32], boxes: u32, pairs: &mut Vec<Pair>
         }
         Ok(reader.pairs)
     });
-    for piece in decoded {
-        pairs.append(&mut piece?);
-    }
-    Ok(())
+    decoded.into_iter().try_for_each(|piece| append(&piece?, ids, pairs))
 }
 
 /// Cuts the words between records into pieces of about [`PIECE`] words.
@@ -134,8 +108,7 @@ impl Reader<'_> {
         let end = self.at + record_len(first);
         if first & PLAIN != 0 {
             for i in (self.at + 1..end).step_by(2) {
-                let pair = Pair { a: self.words[i], b: self.words[i + 1] };
-                self.pairs.push(checked(pair, self.boxes, i)?);
+                self.pairs.push(Pair { a: self.words[i], b: self.words[i + 1] });
             }
             self.at = end;
             return Ok(());
@@ -189,13 +162,14 @@ pub fn pair_count(boxes: u32) -> u64 {
 ///
 /// # Errors
 /// If the number of words is not that of the pairs' bits, or if a bit beyond the last pair is set.
-pub fn bits(words: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
-    let all = pair_count(boxes);
+pub fn bits(words: &[u32], ids: BoxIds<'_>, pairs: &mut PairList) -> Result<(), DecodeError> {
+    let (boxes, all) = (ids.boxes(), pair_count(ids.boxes()));
     if words.len() as u64 != all.div_ceil(32) {
         return Err(DecodeError { what: "not one bit a pair", at: words.len() });
     }
     // The row of pairs (a, b) of the last bit, and the numbers of the row's pairs.
     let (mut a, mut row) = (0, 0..u64::from(boxes).saturating_sub(1));
+    let mut found = Vec::new();
     for (at, &word) in words.iter().enumerate() {
         let mut rest = word;
         while rest != 0 {
@@ -208,53 +182,19 @@ pub fn bits(words: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), Deco
                 a += 1;
                 row = row.end..row.end + u64::from(boxes - 1 - a);
             }
-            pairs.push(Pair { a, b: a + 1 + (k - row.start) as u32 });
+            found.push(Pair { a, b: a + 1 + (k - row.start) as u32 });
         }
     }
-    Ok(())
+    append(&found, ids, pairs)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A pair that is there before.
-    const FIRST: Pair = Pair { a: 0, b: 8 };
-
-    /// More pairs than two threads take at a time, in order, after [`FIRST`].
+    /// Returns more pairs than two threads take at a time, in order.
     fn many() -> Vec<Pair> {
         (3..5 * PIECE as u32).map(|i| Pair { a: i / 3, b: i / 3 + 1 + i % 3 }).collect()
-    }
-
-    fn words_of(pairs: &[Pair]) -> Vec<u32> {
-        bytemuck::cast_slice(pairs).to_vec()
-    }
-
-    fn decoded(pairs: &[Pair]) -> Result<Vec<Pair>, DecodeError> {
-        let mut all = vec![FIRST];
-        plain(&words_of(pairs), u32::MAX, true, &mut all)?;
-        Ok(all.split_off(1))
-    }
-
-    #[test]
-    fn pairs_of_several_pieces_are_appended_in_their_order() {
-        assert_eq!(decoded(&many()), Ok(many()));
-    }
-
-    #[test]
-    fn a_fault_in_any_piece_or_between_two_is_found_and_named() {
-        let piece = 2 * PIECE;
-        for at in [0, 1, piece - 1, piece, 2 * piece, many().len() - 1] {
-            let mut pairs = many();
-            pairs[at].a = pairs[at].b;
-            let wanted = DecodeError { what: "not a < b < boxes", at: 2 * at };
-            assert_eq!(decoded(&pairs), Err(wanted), "at {at}");
-        }
-        for at in [0, piece - 2, piece - 1, piece, 2 * piece - 1] {
-            let mut pairs = many();
-            pairs.swap(at, at + 1);
-            assert_eq!(decoded(&pairs).expect_err("two are swapped").what, "pairs out of order", "at {at}");
-        }
     }
 
     /// Output that came in two parts is one list.
@@ -262,9 +202,13 @@ mod tests {
     fn pairs_out_of_order_at_the_seam_of_two_parts_are_found() {
         let (parts, seam) = (many(), 2 * PIECE + 1);
         let in_parts = |second: &[Pair]| {
-            let mut all = vec![];
-            plain(&words_of(&parts[..seam]), u32::MAX, true, &mut all)?;
-            plain(&words_of(second), u32::MAX, true, &mut all).map(|()| all)
+            let mut all = PairList::default();
+            [&parts[..seam], second]
+                .into_iter()
+                .try_for_each(|part| {
+                    plain(bytemuck::cast_slice(part), BoxIds::First(1 << 30), true, &mut all)
+                })
+                .map(|()| all.into_vec())
         };
         assert_eq!(in_parts(&parts[seam..]).as_ref(), Ok(&parts));
         for second in [&parts[seam - 1..], &parts[..1]] {
@@ -279,12 +223,13 @@ mod tests {
         let record = [2, 0, 0, u32::from_le_bytes([0, 2, 1, 2]), u32::from_le_bytes([3, 0, 0, 0])];
         let repeats = 20_000;
         let row = [Pair { a: 0, b: 1 }, Pair { a: 0, b: 2 }, Pair { a: 0, b: 3 }];
-        let mut pairs = vec![row[0]];
-        assert_eq!(records(&record.repeat(repeats), &entries, 4, &mut pairs), Ok(()));
-        assert_eq!(pairs, [&row[..1], &row.repeat(repeats)].concat());
+        let (mut pairs, ids) = (PairList::from(vec![row[0]]), BoxIds::First(4));
+        assert_eq!(records(&record.repeat(repeats), &entries, ids, &mut pairs), Ok(()));
+        assert_eq!(*pairs, [&row[..1], &row.repeat(repeats)].concat());
         let mut words = record.repeat(repeats);
         *words.last_mut().expect("there are words") = 9;
-        let fault = records(&words, &entries, 4, &mut Vec::new()).expect_err("there is no entry 9");
+        let fault =
+            records(&words, &entries, ids, &mut PairList::default()).expect_err("there is no entry 9");
         assert_eq!((fault.what, fault.at), ("no such entry", words.len()));
     }
 }

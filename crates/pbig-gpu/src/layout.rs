@@ -47,6 +47,20 @@ pub const BITS: u32 = 4;
 pub const SORTED: u32 = 8;
 /// Bit of [`Params::flags`]: redundant tests and overlaps are counted.
 pub const COUNTED: u32 = 16;
+/// Bit of [`Params::flags`]: boxes that live on the device were not measured yet, so there is no plan and no search.
+pub const UNPLANNED: u32 = 32;
+/// Words of [`pbig_shaders::Buffer::Summary`] for the size classes: four each.
+pub const CLASS_WORDS: u32 = 1024;
+/// Number of words of [`pbig_shaders::Buffer::Summary`]. Behind the size classes it has six for each box of the sample.
+pub const SUMMARY_WORDS: u32 = CLASS_WORDS + 6000;
+/// [`PairCount::status`]: all pairs are there.
+pub const COMPLETE: u32 = 0;
+/// [`PairCount::status`]: there was no plan yet.
+pub const NOT_PLANNED: u32 = 1;
+/// [`PairCount::status`]: a list or the pairs did not fit.
+pub const TOO_LARGE: u32 = 2;
+/// [`PairCount::status`]: the plan was made for other boxes.
+pub const PLAN_REFUSED: u32 = 3;
 
 /// Declares structs of plain 32-bit numbers.
 macro_rules! shared_structs {
@@ -73,10 +87,10 @@ shared_structs! {
         entry_capacity: u32, slot_capacity: u32, small_capacity: u32, large_capacity: u32,
         pair_capacity: u32, most_tests: u32, unused: u32, level: [Level; MAX_LEVELS]
     }
-    /// Range of the work items of one dispatch of the check kernels.
+    /// Range of the work of one dispatch: work items for the check kernels, or grouped pairs.
     Chunk {
         first_small: u32, small_items: u32, first_large: u32, large_items: u32,
-        word_capacity: u32, unused: u32, pairs_left: [u32; 2]
+        word_capacity: u32, first_pair: u32, pairs_left: [u32; 2]
     }
     /// Entries of a cell by kind: until the scan counts, then the ends of both lists, then their starts.
     Cell { residents: u32, visitors: u32 }
@@ -100,6 +114,27 @@ shared_structs! {
     /// [`PACKED`] no pairs. `sorted` is 1 if plain pairs are in order.
     Totals { words: [u32; 2], pairs: [u32; 2], made: [u32; 2], redundant: [u32; 2], overlaps: [u32; 2],
         sorted: u32, unused: u32 }
+    /// The content of the buffer [`crate::DevicePairs::count`].
+    ///
+    /// Unless [`PairCount::is_complete`], a call has no pairs: repeat it in a later frame, when the counts of this one are known.
+    /// - `pairs`: number of pairs in the buffer;
+    /// - `status`: 0 if all are there, 1 if the boxes were not measured yet, 2 if pairs or lists did not fit, 3 if the plan was made for
+    ///   other boxes;
+    /// - `needed`: number of pairs that were found, whether they fit or not;
+    /// - `dispatch`: arguments for an indirect dispatch that has a lane for each pair, in workgroups of 256 lanes. The workgroup
+    ///   (x, y) has the pairs from 256 (32,768 y + x) on.
+    #[derive(Eq)]
+    PairCount { pairs: u32, status: u32, needed: u32, unused0: u32, dispatch: [u32; 3], unused1: u32 }
+}
+
+impl PairCount {
+    /// Bytes before `dispatch`.
+    pub const DISPATCH_AT: u64 = 16;
+
+    /// Returns true if all pairs are in the buffer.
+    pub fn is_complete(&self) -> bool {
+        self.status == COMPLETE
+    }
 }
 
 impl Chunk {

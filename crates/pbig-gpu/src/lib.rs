@@ -15,6 +15,9 @@
 //! Without an adapter, or if it fails, the CPU finishes the call, and [`pbig_core::Report::fallback`] says why. An app that has
 //! a wgpu device passes it on by [`GpuFinder::from_device`].
 //!
+//! An app whose boxes are on the device already, and that wants the pairs there, uses [`GpuFinder::record_pairs`]: nothing but a count
+//! crosses the bus.
+//!
 //! A page, where nothing may block, uses [`GpuFinder::open_async`] and [`GpuFinder::find_all_async`], with the feature `webgpu`.
 
 // Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
@@ -44,5 +47,7 @@ pub use gpu::GpuFinders;
 #[cfg(feature = "wgpu")]
 pub use gpu::testing;
 #[cfg(feature = "wgpu")]
-pub use gpu::{GpuError, GpuFinder, adapter, adapters, describe};
+pub use gpu::{DeviceBoxes, DevicePairs, GpuError, GpuFinder, adapter, adapters, describe};
+#[cfg(feature = "wgpu")]
+pub use layout::PairCount;
 pub use options::{Coding, GpuOptions};

@@ -21,7 +21,7 @@ pub enum Coding {
 pub struct GpuOptions {
     /// Coding of the output (PBIG table IV, "data compression").
     pub coding: Coding,
-    /// If true, check, transfer and decoding of several chunks of work overlap (PBIG table IV, "pipelining").
+    /// If true, a piece of a long list comes while threads take the one before (PBIG table IV, "pipelining").
     pub pipelining: bool,
     /// If true, the rows of a large cell get equally many pairs (PBIG table IV, "load balancing").
     pub load_balancing: bool,
@@ -30,10 +30,14 @@ pub struct GpuOptions {
     pub chunk: [u32; 2],
     /// Largest buffer and binding in bytes, at least 2^20. The device may allow less.
     pub max_bytes: u64,
+    /// Largest size of all buffers of a finder together, in bytes; once more for boxes that live on the device. A call that needs more
+    /// is the CPU's: a device without memory fails, and one that shares the system's makes it page.
+    pub max_total_bytes: u64,
     /// Bytes for each box, in the first call, of the lists whose lengths only the device knows. With less than they need the
     /// call begins anew.
     pub first_bytes: u64,
-    /// Longest time that a call waits for the device before it finishes on the CPU.
+    /// Longest time that a call waits for one submission before it finishes on the CPU. A device that hangs costs this time once,
+    /// and after it `pause`: a game sets less, a batch on a device that others use sets more.
     pub patience: Duration,
     /// Time for which calls stay on the CPU after the device failed.
     pub pause: Duration,
@@ -62,6 +66,7 @@ impl GpuOptions {
         load_balancing: true,
         chunk: [1 << 18, 1 << 12],
         max_bytes: u64::MAX,
+        max_total_bytes: 8 << 30,
         first_bytes: 16,
         patience: Duration::from_secs(30),
         pause: Duration::from_secs(5),

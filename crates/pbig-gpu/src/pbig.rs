@@ -1,8 +1,9 @@
 //! Planning of PBIG's grid: statistics of the boxes, and cell sizes by PBIG's equations 2 to 6 (Lo et al. 2013, section
 //! 4.1) or by Avril's density rule (Avril et al. 2012, section 4.1).
 
+use crate::layout::CLASS_WORDS;
 use pbig_core::Aabb;
-use pbig_core::internal::{SizeClasses, size_class_of, size_classes, spread_evenly, threads_for};
+use pbig_core::internal::{SizeClass, SizeClasses, size_class_of, size_classes, spread_evenly, threads_for};
 
 /// First size class that belongs to no level (2^100). A cell of that size, or its inverse, would leave the normal range
 /// of f32.
@@ -30,6 +31,21 @@ impl Summary {
     pub fn of(boxes: &[Aabb]) -> Self {
         let classes = size_classes(boxes, threads_for(boxes.len() / PIECE));
         Self { valid: classes.iter().map(|class| class.boxes).sum(), classes, sample: sampled(boxes) }
+    }
+
+    /// Returns the summary that the kernel `measure` has made of this number of boxes: see [`crate::layout::SUMMARY_WORDS`].
+    pub fn of_device(words: &[u32], count: u32) -> Self {
+        let (of_classes, sample) = words.split_at(CLASS_WORDS as usize);
+        let of_classes = of_classes.as_chunks::<4>().0;
+        let classes: SizeClasses = std::array::from_fn(|i| {
+            let [boxes, x, y, z] = of_classes[i];
+            SizeClass { boxes, extent: [x, y, z].map(f32::from_bits) }
+        });
+        let boxes: &[Aabb] = bytemuck::cast_slice(sample);
+        let is_ordinary = |b: &&Aabb| b.is_valid() && size_class_of(b.extents()) < OVERSIZE_CLASS;
+        let valid = classes.iter().map(|class| class.boxes).sum();
+        let sampled = boxes.iter().take(Self::SAMPLE.min(count as usize));
+        Self { valid, classes, sample: sampled.filter(is_ordinary).copied().collect() }
     }
 
     /// Returns about the number of overlapping pairs, as the sample tells; 0 if too few of its boxes overlap to tell.

@@ -109,7 +109,7 @@ impl Benchmark {
 
     /// Returns true if both processors have found the same pairs.
     pub fn has_equal_pairs(&self) -> bool {
-        self.cpu.pairs() == self.found.pairs
+        self.cpu.pairs() == *self.found.pairs
     }
 
     /// Returns the number of pairs on the CPU.

@@ -22,15 +22,17 @@ fn float_functions(module: &Module, info: &naga::valid::ModuleInfo) -> Vec<Strin
     floats.map(|(function, _)| function.name.clone().unwrap_or_default()).collect()
 }
 
-/// `pair_at` corrects any estimate by integers: tests/suite/kernels/indices.rs.
+/// `pair_at` corrects any estimate by integers: tests/suite/kernels/indices.rs. The extents that `measure` finds decide the cells, and so
+/// the time alone.
 #[test]
-fn no_kernel_computes_with_floats_but_for_the_estimate_of_a_row() {
+fn no_kernel_computes_with_floats_but_for_the_estimate_of_a_row_and_for_plans() {
     let mut estimates = 0;
     for kernel in kernels() {
         let (module, info) = validate(kernel);
         let mut floats = float_functions(&module, &info);
         estimates += floats.len();
-        floats.retain(|name| name != "estimated_row");
+        floats
+            .retain(|name| name != "estimated_row" && (kernel.name, name.as_str()) != ("measure", "extent"));
         assert!(floats.is_empty(), "{}: {floats:?}", kernel.name);
     }
     assert!(estimates > 0, "this test sees no floats");

@@ -63,13 +63,13 @@ pub(super) fn decoded(s: &State) -> Result<Vec<Pair>, String> {
     let n = s.params.boxes;
     let counted = if s.has(BITS) { pair_count(n.into()).div_ceil(32) } else { wide(s.totals.words) };
     let words = s.out.get(..counted as usize).ok_or(format!("{counted} words in {}", s.out.len()))?;
-    let mut pairs = Vec::new();
+    let (mut pairs, ids) = (PairList::default(), BoxIds::First(n));
     let result = if s.has(BITS) {
-        decode::bits(words, n, &mut pairs)
+        decode::bits(words, ids, &mut pairs)
     } else if s.has(PACKED) {
-        decode::records(words, &s.entries, n, &mut pairs)
+        decode::records(words, &s.entries, ids, &mut pairs)
     } else {
-        decode::plain(words, n, false, &mut pairs)
+        decode::plain(words, ids, false, &mut pairs)
     };
     result.map(|()| sorted(&pairs)).map_err(|error| error.to_string())
 }

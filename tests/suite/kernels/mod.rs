@@ -25,12 +25,13 @@ use checks::*;
 use compare::*;
 use device::*;
 use indices::*;
-use pbig_core::{Aabb, Pair, ProxyFilter, oracle};
+use pbig_core::{Aabb, BoxIds, Pair, PairList, ProxyFilter, oracle};
 use pbig_gpu::decode::{self, PLAIN};
 use pbig_gpu::layout::{
-    self, AXIS_BITS, BITS, BOX_BITS, CELLS_PER_BLOCK, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk, Counters,
-    DeviceBox, FILTERED, FIRST_PIECE, GROUPS_PER_ROW, LANES, LargeItem, Level, Located, MAX_SPAN, NO_LEVEL,
-    PACKED, PIECE, PIECES, Params, SHORT_ROW, SPAN_BITS, Slot, SmallItem, Totals, WINDOW, halves, wide,
+    self, AXIS_BITS, BITS, BOX_BITS, CELLS_PER_BLOCK, CLASS_WORDS, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk,
+    Counters, DeviceBox, FILTERED, FIRST_PIECE, GROUPS_PER_ROW, LANES, LargeItem, Level, Located, MAX_SPAN,
+    NO_LEVEL, PACKED, PIECE, PIECES, PairCount, Params, SHORT_ROW, SPAN_BITS, SUMMARY_WORDS, Slot, SmallItem,
+    Totals, UNPLANNED, WINDOW, halves, wide,
 };
 use pbig_gpu::testing::plan_params;
 use pbig_gpu::{GpuFinder, GpuOptions};
@@ -189,6 +190,34 @@ fn arrange_dispatches_nothing_without_capacity() {
 }
 
 #[test]
+fn conclude_says_what_did_not_fit() {
+    let with = |words: u64, capacity: u32, flags: u32| {
+        let mut before = State::before("conclude", &pile()).with(flags, 0);
+        (before.totals.words, before.chunk.word_capacity) = (halves(words), capacity);
+        before.params.most_tests = before.counters.tests;
+        // A list of no words would get the capacity for the twin's.
+        before.out = vec![0];
+        before
+    };
+    let status = |before: &State| {
+        assert_eq!(fault(twin("conclude"), &GpuOptions::DEFAULT, before), None);
+        after_twin(twin("conclude"), before).pair_count.status
+    };
+    let groups = u64::from(2 * LANES * GROUPS_PER_ROW);
+    for words in [0, 2, 2 * 255, 2 * 256, 2 * 257, groups, groups + 2] {
+        assert_eq!(status(&with(words, words as u32, 0)), layout::COMPLETE, "{words} words");
+        assert_eq!(status(&with(words + 2, words as u32, 0)), layout::TOO_LARGE, "{words} words");
+    }
+    assert_eq!(status(&with((1 << 33) + 2, u32::MAX, 0)), layout::TOO_LARGE);
+    assert_eq!(status(&with(2, 2, UNPLANNED)), layout::NOT_PLANNED);
+    let mut before = with(2, 2, 0);
+    before.params.slot_capacity -= 1;
+    assert_eq!(status(&before), layout::TOO_LARGE);
+    before.params.most_tests -= 1;
+    assert_eq!(status(&before), layout::PLAN_REFUSED);
+}
+
+#[test]
 fn checks_agree_with_their_twins() {
     let usual = GpuOptions::DEFAULT;
     check_agrees("check_small", &usual, &[0, PACKED], usize::MAX);
@@ -238,7 +267,10 @@ type Plant = fn(&mut State);
 /// A comparison that never finds a fault would pass every test above.
 #[test]
 fn planted_faults_are_noticed() {
-    let faults: [(&str, Plant); 20] = [
+    let faults: [(&str, Plant); 23] = [
+        ("measure", |s| s.summary.iter_mut().rev().take(3).for_each(|word| *word ^= 1)),
+        ("measure", |s| *s.summary.iter_mut().find(|word| **word > 0).expect("a class") += 1),
+        ("conclude", |s| s.pair_count.status ^= 1),
         ("locate", |s| s.located[7].shape ^= 1 << (SPAN_BITS + 3)),
         ("locate", |s| full(s).residents -= 1),
         ("locate", |s| s.counters.valid -= 1),

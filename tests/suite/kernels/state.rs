@@ -27,6 +27,8 @@ pub(super) struct State {
     pub(super) grouped: Vec<[u32; 2]>,
     pub(super) long_rows: Vec<u32>,
     pub(super) windows: Vec<u32>,
+    pub(super) summary: Vec<u32>,
+    pub(super) pair_count: PairCount,
 }
 
 /// A set of boxes, and the settings of the schedule.
@@ -97,6 +99,7 @@ impl State {
             },
             boxes: case.boxes.clone(),
             filters: (0..n as u32).map(filter).collect(),
+            summary: vec![0; SUMMARY_WORDS as usize],
             located: vec![Located::default(); n],
             cells: vec![Cell::default(); params.cells as usize],
             sums: vec![0; (2 * params.cells).div_ceil(COUNTS_PER_BLOCK) as usize],
@@ -196,6 +199,8 @@ impl State {
             Buffer::Grouped => cast_slice_mut(&mut self.grouped),
             Buffer::LongRows => cast_slice_mut(&mut self.long_rows),
             Buffer::Windows => cast_slice_mut(&mut self.windows),
+            Buffer::Summary => cast_slice_mut(&mut self.summary),
+            Buffer::PairCount => bytes_of_mut(&mut self.pair_count),
         }
     }
 }

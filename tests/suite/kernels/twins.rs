@@ -28,7 +28,8 @@ impl Twin {
 }
 
 /// The twins, in the order in which the kernels run. The kernels of the sort have none.
-pub(super) static TWINS: [Twin; 11] = [
+pub(super) static TWINS: [Twin; 13] = [
+    Twin { kernel: &shaders::MEASURE, run: measure, groups: by_box, compare: None },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: None },
     Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: None },
     Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: None },
@@ -54,6 +55,7 @@ pub(super) static TWINS: [Twin; 11] = [
         compare: Some(compare_checks),
     },
     Twin { kernel: &shaders::CHECK_ALL, run: check_all, groups: by_pair, compare: Some(compare_checks) },
+    Twin { kernel: &shaders::CONCLUDE, run: conclude, groups: one, compare: None },
     Twin { kernel: &shaders::INDEX_PAIRS, run: index_pairs, groups: by_cell, compare: Some(compare_indices) },
 ];
 
@@ -91,6 +93,28 @@ pub(super) fn by_large_item(s: &State) -> u32 {
 
 pub(super) fn by_pair(s: &State) -> u32 {
     pair_count(s.params.boxes.into()).div_ceil(LANES.into()) as u32
+}
+
+pub(super) fn measure(s: &mut State) {
+    let extent = |low: f32, high: f32| {
+        let is_finite = low.is_finite() && high.is_finite();
+        if is_finite { (high - low).to_bits() } else { f32::INFINITY.to_bits() }
+    };
+    for one in s.boxes.iter().filter(|one| one.is_valid()) {
+        let extents = [0, 1, 2].map(|k| extent(one.min[k], one.max[k]));
+        let class = 4 * (extents.into_iter().max().unwrap_or(0) >> 23) as usize;
+        s.summary[class] += 1;
+        for (largest, extent) in s.summary[class + 1..class + 4].iter_mut().zip(extents) {
+            *largest = extent.max(*largest);
+        }
+    }
+    let (count, sample) = (s.boxes.len(), 1000.min(s.boxes.len()));
+    let (_, words) = s.summary.split_at_mut(CLASS_WORDS as usize);
+    for (i, words) in words.chunks_mut(6).take(sample).enumerate() {
+        let walk = (u64::from((i as u32).wrapping_mul(0x9E37_79B9)) * count as u64) >> 32;
+        let one = s.boxes[if count <= 1000 { i } else { walk as usize }];
+        words.copy_from_slice(&[one.min, one.max].concat().iter().map(|x| x.to_bits()).collect::<Vec<_>>());
+    }
 }
 
 pub(super) fn locate(s: &mut State) {
@@ -309,13 +333,35 @@ pub(super) fn place(s: &mut State, cell: usize, entry: u32, resident: bool) {
     }
 }
 
-pub(super) fn arrange(s: &mut State) {
+/// Returns true if all lists fitted, and true if the tests are no more than the plan promised.
+fn fits(s: &State) -> (bool, bool) {
     let (found, room) = (s.counters, s.params);
-    let fits = found.entries <= room.entry_capacity
+    let lists = found.entries <= room.entry_capacity
         && found.slots <= room.slot_capacity
         && found.small_items <= room.small_capacity
-        && found.large_items <= room.large_capacity
-        && (room.most_tests == u32::MAX || found.tests <= room.most_tests && found.too_many_tests == 0);
+        && found.large_items <= room.large_capacity;
+    (lists, room.most_tests == u32::MAX || found.tests <= room.most_tests && found.too_many_tests == 0)
+}
+
+pub(super) fn conclude(s: &mut State) {
+    let (words, (lists_fit, tests_fit)) = (wide(s.totals.words), fits(s));
+    let status = match (s.has(UNPLANNED), tests_fit, lists_fit && words <= s.chunk.word_capacity.into()) {
+        (true, ..) => layout::NOT_PLANNED,
+        (_, false, _) => layout::PLAN_REFUSED,
+        (_, _, false) => layout::TOO_LARGE,
+        _ => layout::COMPLETE,
+    };
+    let needed = u32::try_from(words / 2).unwrap_or(u32::MAX);
+    let pairs = if status == layout::COMPLETE { needed } else { 0 };
+    let groups = pairs.div_ceil(LANES);
+    let dispatch = [groups.min(GROUPS_PER_ROW), groups.div_ceil(GROUPS_PER_ROW), 1];
+    s.pair_count = PairCount { pairs, status, needed, dispatch, ..s.pair_count };
+}
+
+pub(super) fn arrange(s: &mut State) {
+    let found = s.counters;
+    let (lists_fit, tests_fit) = fits(s);
+    let fits = lists_fit && tests_fit;
     let groups = |items: u32| if fits { [items.min(32_768), items.div_ceil(32_768)] } else { [0, 0] };
     let [x, y] = groups(found.small_items.min(s.chunk.small_items));
     let [u, v] = groups(found.large_items.min(s.chunk.large_items));

@@ -1,22 +1,22 @@
 //! The contract of the words that a device returns: docs/PAIR_FORMAT.md. Words that break it are errors, never a panic.
 
 use super::AXIS_BITS;
-use pbig_core::Pair;
+use pbig_core::{BoxIds, Pair, PairList};
 use pbig_gpu::decode::{self, DecodeError, PLAIN};
 
 fn plain(words: &[u32], boxes: u32, is_sorted: bool) -> Result<Vec<Pair>, DecodeError> {
-    let mut pairs = vec![pair(0, 1)];
-    decode::plain(words, boxes, is_sorted, &mut pairs).map(|()| pairs.split_off(1))
+    let mut pairs = PairList::default();
+    decode::plain(words, BoxIds::First(boxes), is_sorted, &mut pairs).map(|()| pairs.into_vec())
 }
 
 fn records(words: &[u32], entries: &[u32], boxes: u32) -> Result<Vec<Pair>, DecodeError> {
-    let mut pairs = vec![pair(0, 1)];
-    decode::records(words, entries, boxes, &mut pairs).map(|()| pairs.split_off(1))
+    let mut pairs = PairList::default();
+    decode::records(words, entries, BoxIds::First(boxes), &mut pairs).map(|()| pairs.into_vec())
 }
 
 fn bits(words: &[u32], boxes: u32) -> Result<Vec<Pair>, DecodeError> {
-    let mut pairs = vec![pair(0, 1)];
-    decode::bits(words, boxes, &mut pairs).map(|()| pairs.split_off(1))
+    let mut pairs = PairList::default();
+    decode::bits(words, BoxIds::First(boxes), &mut pairs).map(|()| pairs.into_vec())
 }
 
 fn pair(a: u32, b: u32) -> Pair {

@@ -337,7 +337,8 @@ impl AllPairs {
         let max_pairs = config.limits.pairs();
         // Rows are sorted later, by several threads.
         let request = SearchRequest { boxes, filters, is_sorted: false, max_pairs };
-        let (outcome, mut found) = device.find_all(&request, std::mem::take(&mut self.answer));
+        let (outcome, found) = device.find_all(&request, std::mem::take(&mut self.answer));
+        let mut found = found.into_vec();
         if outcome.end == End::Done {
             self.take(&mut found, grouping);
         }

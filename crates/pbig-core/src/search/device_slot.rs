@@ -4,11 +4,8 @@ use super::{End, Outcome};
 use crate::pair_device::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 use crate::policy::{Choice, Work, choose_backend};
 use crate::report::{Clock, Report, StageTimes, stage};
-use crate::{Algorithm, Config, Pair, Plan, parallel};
+use crate::{Algorithm, Config, Pair, PairList, Plan};
 use std::time::Duration;
-
-/// Pairs of an answer that a thread checks at a time.
-const PIECE: usize = 1 << 16;
 
 /// Room for a device. A clone has a device of its own.
 #[derive(Clone, Debug, Default)]
@@ -53,12 +50,13 @@ impl DeviceSlot {
         &mut self,
         request: &SearchRequest<'_>,
         mut pairs: Vec<Pair>,
-    ) -> (Outcome, Vec<Pair>) {
+    ) -> (Outcome, PairList) {
         stage!("device");
         pairs.clear();
-        let (mut clock, mut found) = (Clock::start(), DeviceFound { pairs, ..DeviceFound::default() });
+        let mut found = DeviceFound { pairs: pairs.into(), ..DeviceFound::default() };
+        let mut clock = Clock::start();
         let Some(device) = &mut self.device else { return (Outcome::default(), found.pairs) };
-        let outcome = match device.find_all(request, &mut found).and_then(|()| check(&found, request)) {
+        let outcome = match device.find_all(request, &mut found).and_then(|()| check(&mut found, request)) {
             Ok(()) => {
                 self.has_warned = false;
                 found.report.name = self.name().unwrap_or_default().to_owned();
@@ -96,47 +94,12 @@ fn success(found: &DeviceFound, time: Duration) -> Outcome {
 }
 
 /// Returns an error if an answer has too many pairs, or not the form that a device promises.
-fn check(found: &DeviceFound, request: &SearchRequest<'_>) -> Result<(), DeviceFailure> {
+fn check(found: &mut DeviceFound, request: &SearchRequest<'_>) -> Result<(), DeviceFailure> {
     let boxes = request.boxes.len();
     let is_counted = found.valid as usize <= boxes && (found.valid > 1 || found.pairs.is_empty());
-    if !are_pairs(&found.pairs, boxes) || !is_counted {
+    if !found.pairs.names_only(boxes) || !is_counted {
         let form = format!("pairs a < b < {boxes}, and at most {boxes} valid boxes, two or more for a pair");
         return Err(DeviceFailure::Failed(format!("the device's answer is malformed: {form} were expected")));
     }
     if found.pairs.len() as u64 > request.max_pairs { Err(DeviceFailure::TooManyPairs) } else { Ok(()) }
-}
-
-/// Returns true if pairs are in order, each once. Threads share the work: one alone takes as long as the device for all the rest.
-pub(crate) fn are_in_order(pairs: &[Pair]) -> bool {
-    let pieces: Vec<&[Pair]> = pairs.chunks(PIECE).collect();
-    let is_after_last = |i: usize| pieces[i - 1].last() < pieces[i].first();
-    let is_good = |i: usize| (i == 0 || is_after_last(i)) && pieces[i].is_sorted_by(|one, next| one < next);
-    parallel::map(pieces.len(), is_good).into_iter().all(|is_good| is_good)
-}
-
-/// Returns true if every pair is `a < b < boxes`.
-fn are_pairs(pairs: &[Pair], boxes: usize) -> bool {
-    let pieces: Vec<&[Pair]> = pairs.chunks(PIECE).collect();
-    // Without an early end in a piece, so that the compiler uses SIMD.
-    let is_good = |pair: &Pair| (pair.a < pair.b) & ((pair.b as usize) < boxes);
-    let are_good = |i: usize| pieces[i].iter().fold(true, |all, pair| all & is_good(pair));
-    parallel::map(pieces.len(), are_good).into_iter().all(|is_good| is_good)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pairs_out_of_order_or_twice_are_noticed_in_every_piece_and_between_two() {
-        let pairs: Vec<Pair> = (0..3 * PIECE as u32).map(|i| Pair::new(i, i + 1)).collect();
-        assert!(are_in_order(&pairs) && are_in_order(&pairs[..1]) && are_in_order(&[]));
-        for at in [0, PIECE - 1, PIECE, 2 * PIECE - 1, 3 * PIECE - 2] {
-            let mut others = pairs.clone();
-            others.swap(at, at + 1);
-            assert!(!are_in_order(&others), "swapped at {at}");
-            others[at] = others[at + 1];
-            assert!(!are_in_order(&others), "twice at {at}");
-        }
-    }
 }

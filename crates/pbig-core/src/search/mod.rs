@@ -19,6 +19,6 @@ mod streamed;
 
 pub(crate) use all_pairs::{AllPairs, Request, Store};
 pub(crate) use budget::Budget;
-pub(crate) use device_slot::{DeviceSlot, are_in_order};
+pub(crate) use device_slot::DeviceSlot;
 pub(crate) use hits::{ById, Receiver};
 pub(crate) use outcome::{End, Outcome};

@@ -91,7 +91,7 @@ impl PairDevice for Double {
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
         let all = vec![ProxyFilter::ALL; request.boxes.len()];
-        found.pairs = oracle::pairs_filtered(request.boxes, request.filters.unwrap_or(&all));
+        found.pairs = oracle::pairs_filtered(request.boxes, request.filters.unwrap_or(&all)).into();
         found.valid = request.boxes.iter().filter(|one| one.is_valid()).count() as u32;
         if found.pairs.len() as u64 > request.max_pairs && self.fault != Fault::IgnoresLimits {
             return Err(DeviceFailure::TooManyPairs);

@@ -4,22 +4,31 @@ use super::coding::bit_words;
 use super::error::Failure;
 use super::gpu_device::Variant;
 use super::items::rest;
-use super::passes::{Recording, Step, check, lists_fit, sort};
+use super::passes::{
+    ALL_GROUPED, Groups, MOST_RANKED, Recording, Step, check, group, lists_fit, pair_capacity, rank,
+};
 use super::readback::{self, HEADER_BYTES, Header, Mapped};
-use super::session::Session;
-use super::storage::{BufferId, Side};
+use super::session::{Session, first_bytes};
+use super::storage::BufferId;
 use super::{GpuError, wait};
 use crate::decode::{self, DecodeError};
-use crate::layout::{BITS, Chunk, Counters, PACKED, Params, SORTED, Totals, halves, wide};
+use crate::layout::{BITS, Chunk, Counters, LANES, PACKED, Params, SORTED, Totals, halves, wide};
+use pbig_core::BoxIds;
 use pbig_core::internal::Clock;
 use pbig_shaders::{Buffer, Kernel};
+use std::ops::Range;
 use std::time::Duration;
+
+/// Bytes of output that may come with the counts. Few pairs then take one wait. A call reads at most 4 kB more than its pairs.
+const PREFETCHED_BYTES: u64 = 3072;
+
+/// Bytes that the host reads at a time: while threads copy and check one piece, the next one comes.
+const PIECE_BYTES: u64 = 1 << 24;
 
 /// A chunk that the device is working on.
 #[derive(Debug)]
 pub(super) struct PendingChunk {
     pub(super) items: Chunk,
-    side: Side,
     submission: wgpu::SubmissionIndex,
     /// Number of submissions that the wait for it covers: those before it have no wait of their own.
     submissions: u32,
@@ -37,26 +46,39 @@ pub(super) enum ChunkResult {
     TooManyTests,
     /// The output needs this many words.
     OutputTooLarge(u64),
-    /// The pairs are on the device, to be sorted when the other chunks are done.
-    Unsorted,
+    /// There are more work items. Their pairs come behind these, in one list.
+    Partial,
+}
+
+/// A piece of a buffer that is on its way to the host.
+struct Fetch {
+    staging: BufferId,
+    bytes: u64,
+    submission: wgpu::SubmissionIndex,
 }
 
 impl Session {
-    /// Submits a chunk: uploads that wait, and `steps`.
-    pub(super) fn submit(
-        &mut self,
-        items: Chunk,
-        side: Side,
-        steps: &[Step],
-    ) -> Result<PendingChunk, GpuError> {
-        let prefetched = self.make_room(side)?;
-        self.write_chunk(items, side)?;
-        let (submission, passes) = self.record(side, steps, Some(prefetched))?;
-        Ok(PendingChunk { items, side, submission, submissions: 1, prefetched, passes })
+    /// Submits a chunk: uploads that wait, and `steps`. If the pairs are sorted, the device begins with that while their number comes
+    /// home; unless the sort is timed, or so short that all pairs may come at once.
+    pub(super) fn submit(&mut self, items: Chunk, steps: &[Step]) -> Result<PendingChunk, GpuError> {
+        let prefetched = self.make_room()?;
+        self.write_chunk(items)?;
+        let mut all = steps.to_vec();
+        let is_fused = prefetched > 0 || self.timestamps.is_some();
+        if self.has(SORTED) && is_fused {
+            self.params.pair_capacity = self.params.pair_capacity.min(MOST_RANKED);
+            all.extend(group(&self.params));
+            all.extend(rank(ALL_GROUPED, true));
+        }
+        let (submission, passes) = self.record(&all, Some(prefetched))?;
+        if self.has(SORTED) && !is_fused {
+            self.record(&group(&self.params), None)?;
+        }
+        Ok(PendingChunk { items, submission, submissions: 1, prefetched, passes })
     }
 
     /// Checks the `expected` work items after `done`, which add their pairs to those of the first. Sorts all.
-    pub(super) fn submit_rest_and_sort(
+    pub(super) fn submit_rest(
         &mut self,
         done: &Chunk,
         expected: &Counters,
@@ -68,84 +90,91 @@ impl Session {
         let Counters { small_items, large_items, .. } = *expected;
         let (small_items, large_items) =
             (small_items.max(done.small_items), large_items.max(done.large_items));
-        let last = self.submit(Chunk { small_items, large_items, ..*done }, 0, &sort(&self.params))?;
+        let last = self.submit(Chunk { small_items, large_items, ..*done }, &[])?;
         Ok(PendingChunk { submissions: others.len() as u32 + 2, ..last })
     }
 
     /// Submits a chunk whose output stays on the device.
     pub(super) fn submit_unread(&mut self, items: Chunk, steps: &[Step]) -> Result<(), GpuError> {
-        self.write_chunk(items, 0)?;
-        self.record(0, steps, None).map(|_| ())
+        self.write_chunk(items)?;
+        self.record(steps, None).map(|_| ())
+    }
+
+    /// Orders this number of pairs, which are grouped or will be. Each submission ranks a part of them.
+    fn submit_ranks(&mut self, items: Chunk, pairs: u32) -> Result<(), GpuError> {
+        for first_pair in (0..pairs).step_by(MOST_RANKED as usize) {
+            let left = pairs - first_pair;
+            let groups = Groups::Direct(left.min(MOST_RANKED).div_ceil(LANES));
+            self.submit_unread(Chunk { first_pair, ..items }, &rank(groups, left <= MOST_RANKED))?;
+        }
+        Ok(())
     }
 
     /// Tells the kernels which work items to check, and how much output there may be: beyond the limit they count no more.
-    fn write_chunk(&mut self, items: Chunk, side: Side) -> Result<(), GpuError> {
-        let capacity = self.storage.size(BufferId::of(Buffer::Out, side)) / 4;
+    fn write_chunk(&mut self, items: Chunk) -> Result<(), GpuError> {
+        let capacity = self.storage.size(Buffer::Out) / 4;
         let word_capacity = capacity.min(u64::from(u32::MAX) - 1) as u32;
         let items = Chunk { word_capacity, pairs_left: halves(self.sink.left()), ..items };
-        self.storage.write(BufferId::of(Buffer::Chunk, side), &[items])
+        self.storage.write(Buffer::Chunk, &[items])
     }
 
     /// Records and submits uploads that wait, `steps`, and a readback of some bytes of output, if they are told.
     /// Returns the kernels.
     fn record(
         &mut self,
-        side: Side,
         steps: &[Step],
         prefetched: Option<u64>,
     ) -> Result<(wgpu::SubmissionIndex, Vec<&'static Kernel>), GpuError> {
         let mut clock = Clock::start();
         self.storage.write(Buffer::Params, &[self.params])?;
         let timestamps = self.timestamps.as_ref().filter(|_| prefetched.is_some());
-        let copies = self.storage.copies.take();
-        let has_copies = copies.is_some();
+        let (mut encoder, uploaded) =
+            self.storage.copies.take().unwrap_or_else(|| (self.device.encoder(), vec![]));
         let mut recording = Recording {
-            encoder: copies.unwrap_or_else(|| self.device.encoder()),
+            encoder: &mut encoder,
             storage: &mut self.storage,
-            side,
             variant: Variant::new(&self.options),
             queries: timestamps.map(|timestamps| &timestamps.queries),
             passes: Vec::new(),
         };
         recording.record(steps);
+        let report = &mut self.sink.found.report;
         if let Some(prefetched) = prefetched {
-            readback::record(&mut recording, timestamps, prefetched);
+            report.downloaded += readback::record(&mut recording, timestamps, prefetched);
         }
-        let Recording { encoder, passes, .. } = recording;
+        let passes = recording.passes;
         let submission = self.device.submit(encoder);
-        if has_copies {
-            self.storage.take_staging_back();
-        }
-        self.sink.found.report.record += clock.lap();
+        self.storage.take_staging_back(&uploaded);
+        report.record += clock.lap();
         Ok((submission, passes))
     }
 
     /// Makes the buffers for the output of a chunk. Returns the bytes to prefetch.
-    pub(super) fn make_room(&mut self, side: Side) -> Result<u64, GpuError> {
-        let first_bytes = self.first_bytes();
+    pub(super) fn make_room(&mut self) -> Result<u64, GpuError> {
+        let first_bytes = first_bytes(&self.options, self.params.boxes);
         let (storage, sizes) = (&mut self.storage, &self.sizes);
-        let (out, most) = (BufferId::of(Buffer::Out, side), storage.max_buffer_bytes);
+        let most = storage.max_buffer_bytes;
+        let are_few = 4 * sizes.expected_words <= PREFETCHED_BYTES && self.sink.found.report.waits == 0;
         let (words, prefetched) = if self.params.flags & BITS == 0 {
-            (sizes.word_capacity, sizes.expected_words + sizes.expected_words / 4 + 64)
+            (sizes.word_capacity, if are_few { PREFETCHED_BYTES } else { 0 })
         } else {
             // The last workgroup writes all of its eight words.
-            let words = bit_words(&self.params).next_multiple_of(8);
-            (words, words)
+            let words = bit_words(&self.params);
+            (words.next_multiple_of(8), 4 * words)
         };
-        storage.ensure(out, (4 * words).clamp(first_bytes.min(most), most))?;
-        storage.ensure(BufferId::of(Buffer::Totals, side), size_of::<Totals>() as u64)?;
+        storage.ensure(Buffer::Out, (4 * words).clamp(first_bytes.min(most), most))?;
+        storage.ensure(Buffer::Totals, size_of::<Totals>() as u64)?;
         storage.ensure(Buffer::Counters, size_of::<Counters>() as u64)?;
-        let prefetched = (4 * prefetched).min(storage.size(out)).min(most - HEADER_BYTES);
-        storage.ensure(BufferId::Staging(side), HEADER_BYTES + prefetched)?;
+        let prefetched = prefetched.min(storage.size(Buffer::Out)).min(most - HEADER_BYTES);
+        storage.ensure(BufferId::Staging, HEADER_BYTES + prefetched)?;
         Ok(prefetched)
     }
 
-    /// Waits for a chunk and decodes its output where it lies, if everything fitted.
+    /// Waits for the counts of a chunk, and takes its output, if everything fitted.
     pub(super) async fn finish(&mut self, chunk: PendingChunk) -> Result<ChunkResult, Failure> {
-        let staging = BufferId::Staging(chunk.side);
         let patience = self.options.patience.saturating_mul(chunk.submissions);
         let bytes = HEADER_BYTES + chunk.prefetched;
-        let received = self.receive(staging, bytes, chunk.submission, patience).await?;
+        let received = self.receive(BufferId::Staging, bytes, chunk.submission, patience).await?;
         let (header, prefetched) = received.split_at(HEADER_BYTES as usize);
         let header: Header = bytemuck::pod_read_unaligned(header);
         if self.timestamps.is_some() {
@@ -153,25 +182,35 @@ impl Session {
             times.for_each(|(kernel, time)| self.sink.add_time(kernel, time));
         }
         let Header { totals, counters, .. } = header;
-        let (out, needed) = (BufferId::of(Buffer::Out, chunk.side), output_words(&self.params, &totals));
-        let repeat = self.refused(&counters);
-        if repeat.is_none() {
+        let needed = output_words(&self.params, &totals);
+        if let Some(refused) = self.refused(&counters) {
             // The counts of a refused map are of no account.
-            self.sink.check(found_pairs(&self.params, &totals))?;
+            self.sink.found.report.repeats += 1;
+            return Ok(refused);
         }
-        let fits = needed <= self.storage.size(out) / 4;
+        self.sink.check(found_pairs(&self.params, &totals))?;
+        // Without a grid the counters are those of an earlier call.
+        if self.params.levels > 0 && !rest(&counters, &chunk.items).is_empty() {
+            return Ok(ChunkResult::Partial);
+        }
         let report = &mut self.sink.found.report;
-        if let Some(repeat) = repeat.or((!fits).then_some(ChunkResult::OutputTooLarge(needed))) {
+        if needed > self.storage.size(Buffer::Out) / 4 {
             report.repeats += 1;
-            return Ok(repeat);
+            return Ok(ChunkResult::OutputTooLarge(needed));
         }
         report.chunks += chunk.submissions.saturating_sub(1).max(1);
-        let is_sorted = totals.sorted != 0;
-        if self.has(SORTED) && !is_sorted && !rest(&counters, &chunk.items).is_empty() {
-            return Ok(ChunkResult::Unsorted);
-        }
         self.sink.count(&self.params, &totals, needed);
-        self.take_output(bytemuck::cast_slice(prefetched), out, needed, is_sorted).await?;
+        self.sizes.max_words = self.sizes.max_words.max(needed);
+        self.sizes.expected_words = self.sizes.max_words;
+        let is_sorted = self.sort(chunk.items, totals.sorted != 0, needed)?;
+        if 4 * needed <= chunk.prefetched && (is_sorted || !self.has(SORTED)) {
+            let words: &[u32] = bytemuck::cast_slice(prefetched);
+            self.prepare_table(needed).await?;
+            self.decode_words(&words[..needed as usize], is_sorted)?;
+        } else {
+            drop(received);
+            self.take_output(needed, is_sorted).await?;
+        }
         Ok(ChunkResult::Done)
     }
 
@@ -192,41 +231,28 @@ impl Session {
         (!lists_fit(&self.params, counters)).then_some(ChunkResult::MapTooLarge)
     }
 
-    /// Reads the words of output that did not come with the header, and decodes all. Notes how many there were.
-    async fn take_output(
-        &mut self,
-        prefetched: &[u32],
-        out: BufferId,
-        needed: u64,
-        is_sorted: bool,
-    ) -> Result<(), Failure> {
-        self.sizes.max_words = self.sizes.max_words.max(needed);
-        self.sizes.expected_words = self.sizes.max_words;
-        let have = prefetched.len() as u64;
-        if needed <= have {
-            return self.decode_words(&prefetched[..needed as usize], is_sorted).await;
+    /// Reads exactly the words of output, and decodes them. Plain pairs are read once, where they lie in mapped memory.
+    async fn take_output(&mut self, needed: u64, is_sorted: bool) -> Result<(), Failure> {
+        self.prepare_table(needed).await?;
+        if !self.has(PACKED) && !self.has(BITS) {
+            let decode = |session: &mut Self, words: &[u32]| session.decode_words(words, is_sorted);
+            return self.read(Buffer::Out, needed, decode).await;
         }
-        if self.has(PACKED) || self.has(BITS) {
-            // A record may begin in one part and end in the other. The second is given back, for the entries.
-            let rest = self.fetch(out, have, needed).await?;
-            let words = [prefetched, bytemuck::cast_slice(&rest)].concat();
-            drop(rest);
-            return self.decode_words(&words, is_sorted).await;
-        }
-        // Plain pairs are decoded where they lie: a copy of many would take longer than the device.
-        let whole_pairs = prefetched.len() & !1;
-        self.decode_words(&prefetched[..whole_pairs], is_sorted).await?;
-        let rest = self.fetch(out, whole_pairs as u64, needed).await?;
-        self.decode_words(bytemuck::cast_slice(&rest), is_sorted).await
+        // A record may begin in one piece and end in the next one.
+        let words = self.collect(Buffer::Out, needed).await?;
+        self.decode_words(&words, is_sorted)
     }
 
-    async fn decode_words(&mut self, words: &[u32], is_sorted: bool) -> Result<(), Failure> {
-        // Records name entries, which are read once a job.
-        let entries = u64::from(self.sizes.lists.entries);
-        if self.has(PACKED) && self.table.is_none() && !words.is_empty() && entries > 0 {
-            let entries = self.fetch(Buffer::Entries.into(), 0, entries).await?;
-            self.table = Some(bytemuck::pod_collect_to_vec(&entries));
+    /// Reads the entries that records name, once a job.
+    async fn prepare_table(&mut self, needed: u64) -> Result<(), Failure> {
+        if self.has(PACKED) && self.table.is_none() && needed > 0 {
+            let entries = u64::from(self.sizes.lists.entries);
+            self.table = Some(self.collect(Buffer::Entries, entries).await?);
         }
+        Ok(())
+    }
+
+    fn decode_words(&mut self, words: &[u32], is_sorted: bool) -> Result<(), Failure> {
         let mut clock = Clock::start();
         self.decode(words, is_sorted)?;
         self.sink.found.report.decode += clock.lap();
@@ -234,27 +260,82 @@ impl Session {
     }
 
     fn decode(&mut self, words: &[u32], is_sorted: bool) -> Result<(), DecodeError> {
-        let boxes = self.params.boxes;
         let (is_packed, is_bits) = (self.has(PACKED), self.has(BITS));
+        let ids = self.part_ids.as_deref().map_or(BoxIds::First(self.params.boxes), BoxIds::Part);
         let pairs = &mut self.sink.found.pairs;
         if is_bits {
-            decode::bits(words, boxes, pairs)
+            decode::bits(words, ids, pairs)
         } else if is_packed {
-            decode::records(words, self.table.as_deref().unwrap_or(&[]), boxes, pairs)
+            decode::records(words, self.table.as_deref().unwrap_or(&[]), ids, pairs)
         } else {
-            decode::plain(words, boxes, is_sorted, pairs)
+            decode::plain(words, ids, is_sorted, pairs)
         }
     }
 
-    /// Reads the words `from..to` of a buffer, at least one, in a submission of its own.
-    async fn fetch(&mut self, source: BufferId, from: u64, to: u64) -> Result<Mapped, GpuError> {
-        let bytes = 4 * (to - from);
-        self.storage.ensure(BufferId::FetchStaging, bytes)?;
-        let staging = self.storage.get(BufferId::FetchStaging);
+    /// Copies words of a buffer.
+    async fn collect(&mut self, source: Buffer, words: u64) -> Result<Vec<u32>, Failure> {
+        let mut all = Vec::with_capacity(words as usize);
+        let add = |_: &mut Self, words: &[u32]| {
+            all.extend_from_slice(words);
+            Ok(())
+        };
+        self.read(source, words, add).await?;
+        Ok(all)
+    }
+
+    /// Reads the first words of a buffer, in submissions of their own. With pipelining a piece comes while the one before is taken.
+    async fn read(
+        &mut self,
+        source: Buffer,
+        words: u64,
+        mut take: impl FnMut(&mut Self, &[u32]) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let most = if self.options.pipelining { PIECE_BYTES } else { u64::MAX };
+        let piece = self.storage.max_buffer_bytes.min(most);
+        let mut next = self.fetch(source, 0..(4 * words).min(piece), 0)?;
+        let mut from = piece;
+        while let Some(fetch) = next {
+            next = self.fetch(source, from..(4 * words).min(from + piece), (from / piece) as usize % 2)?;
+            from += piece;
+            let received =
+                self.receive(fetch.staging, fetch.bytes, fetch.submission, self.options.patience).await?;
+            take(self, bytemuck::cast_slice(&received))?;
+        }
+        Ok(())
+    }
+
+    /// Begins to read some bytes of a buffer, if there are any.
+    fn fetch(&mut self, source: Buffer, range: Range<u64>, which: usize) -> Result<Option<Fetch>, GpuError> {
+        if range.is_empty() {
+            return Ok(None);
+        }
+        let (staging, bytes) = (BufferId::FetchStaging(which), range.end - range.start);
+        self.storage.ensure(staging, bytes)?;
         let mut encoder = self.device.encoder();
-        encoder.copy_buffer_to_buffer(self.storage.get(source), 4 * from, staging, 0, bytes);
+        let (from, to) = (self.storage.get(source), self.storage.get(staging));
+        encoder.copy_buffer_to_buffer(from, range.start, to, 0, bytes);
+        self.sink.found.report.downloaded += bytes;
         let submission = self.device.submit(encoder);
-        self.receive(BufferId::FetchStaging, bytes, submission, self.options.patience).await
+        Ok(Some(Fetch { staging, bytes, submission }))
+    }
+
+    /// Sorts the pairs of the last chunk, unless they are sorted. Returns true if they are in order when they are read.
+    fn sort(&mut self, items: Chunk, is_sorted: bool, words: u64) -> Result<bool, GpuError> {
+        let pairs = u32::try_from(words / 2).unwrap_or(u32::MAX);
+        if !self.has(SORTED) || is_sorted {
+            return Ok(self.has(SORTED));
+        }
+        let capacity = pair_capacity(&self.storage);
+        if pairs > capacity {
+            return Ok(false);
+        }
+        if pairs > self.params.pair_capacity {
+            // A sort that is submitted with the check leaves so many.
+            self.params.pair_capacity = capacity;
+            self.submit_unread(items, &group(&self.params))?;
+        }
+        self.submit_ranks(items, pairs)?;
+        Ok(true)
     }
 
     /// Waits for a submission. Returns the first `bytes` of the staging buffer that it has filled.
@@ -271,7 +352,6 @@ impl Session {
         let received = Mapped::new(&self.device, staging, bytes)?;
         let report = &mut self.sink.found.report;
         report.wait += clock.lap();
-        report.downloaded += bytes;
         report.waits += 1;
         Ok(received)
     }

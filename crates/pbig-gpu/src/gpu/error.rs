@@ -24,7 +24,7 @@ pub enum GpuError {
     #[error("the device was lost")]
     Lost,
     /// The device did not answer in time.
-    #[error("the device did not answer within {0:?}")]
+    #[error("the device did not answer within {0:?} (GpuOptions::patience)")]
     Timeout(std::time::Duration),
     /// A page may not block: it uses the `async` functions of [`crate::GpuFinder`].
     #[error("a page may not block: use GpuFinder::open_async and find_all_async")]
@@ -48,6 +48,21 @@ pub enum GpuError {
         /// The limit, in bytes.
         limit: u64,
     },
+    /// All buffers together would be larger than [`crate::GpuOptions::max_total_bytes`].
+    #[error(
+        "{what}: with it the device's buffers are {bytes} bytes, but GpuOptions::max_total_bytes allows {limit}"
+    )]
+    OverBudget {
+        /// The name of the buffer that was to be made.
+        what: &'static str,
+        /// The size of all buffers with it, in bytes.
+        bytes: u64,
+        /// The limit, in bytes.
+        limit: u64,
+    },
+    /// An argument is wrong, for this reason.
+    #[error("{0}")]
+    Argument(String),
     /// The device returned words that break the pair format.
     #[error(transparent)]
     Decode(#[from] DecodeError),

@@ -4,7 +4,7 @@ use super::{GpuError, adapter, wait};
 use crate::GpuOptions;
 use pbig_shaders::{Buffer, KERNELS, Kernel, SCAN_BLOCKS, SCAN_SUMS};
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A fault that a test injects at a later submission.
@@ -60,6 +60,7 @@ pub(super) struct GpuDevice {
     pub(super) name: String,
     pub(super) is_software: bool,
     pub(super) has_timestamps: bool,
+    pub(super) buffers_made: AtomicU32,
     pipelines: Mutex<HashMap<(&'static str, Variant), wgpu::ComputePipeline>>,
     is_lost: AtomicBool,
     /// A call of a page is in progress.
@@ -79,6 +80,7 @@ impl GpuDevice {
             has_timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
             handle: device,
             queue,
+            buffers_made: AtomicU32::new(0),
             pipelines: Mutex::default(),
             is_lost: AtomicBool::new(false),
             #[cfg(target_arch = "wasm32")]
@@ -222,6 +224,7 @@ impl GpuDevice {
         if self.is_due(Fault::OutOfMemory) {
             return Err(GpuError::OutOfMemory);
         }
+        self.buffers_made.fetch_add(1, Ordering::Relaxed);
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation };
         Ok(self.handle.create_buffer(&descriptor))
     }

@@ -11,6 +11,9 @@ use pbig_core::Aabb;
 /// Factor by which the number of boxes, or the work for a box, may change until a plan is outgrown.
 const OUTGROWN: u64 = 2;
 
+/// Factor on the cells with which a plan of too many tests is tried once more.
+pub(super) const FINER_RETRY: f32 = 0.125;
+
 /// Maximum number of cells of a plan.
 const MAX_CELLS: u64 = 1 << 28;
 
@@ -28,9 +31,23 @@ pub(super) struct KeptPlan {
 impl KeptPlan {
     /// Plans for boxes, with a factor on the cells, on a device with buffers of at most this size.
     pub(super) fn new(boxes: &[Aabb], (options, cell_factor): (&GpuOptions, f32), max_bytes: u64) -> Self {
-        let summary = Summary::of(boxes);
-        let plan = GpuPlan::new(&summary, options, cell_factor, (max_bytes / 8).min(MAX_CELLS) as u32);
-        Self { plan, boxes: boxes.len() as u64, pairs: summary.pairs(), first_work: None }
+        Self::of(&Summary::of(boxes), boxes.len() as u32, (options, cell_factor), max_bytes)
+    }
+
+    /// Plans as [`KeptPlan::new`], for this number of boxes that were measured.
+    pub(super) fn of(
+        summary: &Summary,
+        boxes: u32,
+        (options, cell_factor): (&GpuOptions, f32),
+        max_bytes: u64,
+    ) -> Self {
+        let plan = GpuPlan::new(summary, options, cell_factor, (max_bytes / 8).min(MAX_CELLS) as u32);
+        Self { plan, boxes: boxes.into(), pairs: summary.pairs(), first_work: None }
+    }
+
+    /// Returns true if a call of this number of boxes needs more tests than the plan promised.
+    pub(super) fn refuses(&self, counters: &Counters, boxes: u32, boxes_per_cell: f32) -> bool {
+        counters.too_many_tests != 0 || counters.tests > self.most_tests(boxes, boxes_per_cell)
     }
 
     /// Returns true if no search has used the plan.

@@ -16,6 +16,8 @@ mod kept_plan;
 mod levels;
 mod passes;
 mod readback;
+mod reports;
+mod resident;
 mod search;
 mod session;
 #[cfg(not(target_arch = "wasm32"))]
@@ -31,6 +33,7 @@ pub use adapter::{adapter, adapters, describe};
 use error::Failure;
 pub use error::GpuError;
 use gpu_plan::GpuPlan;
+pub use resident::{DeviceBoxes, DevicePairs};
 #[cfg(not(target_arch = "wasm32"))]
 pub use several::GpuFinders;
 
@@ -40,6 +43,7 @@ use gpu_device::GpuDevice;
 use job::Job;
 use pbig_core::internal::Clock;
 use pbig_core::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
+use resident::Resident;
 use search::search;
 use session::Session;
 use std::sync::Arc;
@@ -67,6 +71,7 @@ pub struct GpuFinder {
     options: GpuOptions,
     device: Option<Arc<GpuDevice>>,
     session: Option<Session>,
+    resident: Option<Resident>,
     failed: Option<(Clock, String)>,
     declined: Declined,
 }
@@ -181,6 +186,68 @@ impl GpuFinder {
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
         self.run(&Job::all(request), found).await.map_err(Failure::for_core)
+    }
+
+    /// Records a search of boxes that live on the device, and whose pairs stay there. Submits nothing, waits for nothing, and, where
+    /// lengths stay, allocates nothing.
+    ///
+    /// Plan and lengths follow from the counts of earlier calls. The first call of more than [`GpuOptions::all_pairs_up_to`] boxes only
+    /// measures them, and a call with many more pairs than the last one may not have room for them. Then the result says so, and the
+    /// call can be repeated: see [`crate::PairCount`]. A list beyond what one buffer holds is an error of a later call. Each scene
+    /// has a finder of its own, which may be a clone: plan and lengths are those of one scene.
+    ///
+    /// The caller submits what was recorded in the order of the calls, and polls the device from time to time, as wgpu asks; a call polls
+    /// it once. `examples/resident.rs` shows all.
+    ///
+    /// # Errors
+    /// [`GpuError::Argument`] if the boxes do not lie in a buffer from which the device can copy them; [`GpuError::Refused`] if that buffer
+    /// is that of another device of the same [`wgpu::Instance`]; other errors as those of a search. An encoder of another device is
+    /// wgpu's error when it is finished.
+    pub fn record_pairs(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        boxes: &DeviceBoxes<'_>,
+    ) -> Result<DevicePairs, GpuError> {
+        let device = self.device_now()?;
+        self.record_on(&device, encoder, boxes)
+    }
+
+    /// Records a search as [`GpuFinder::record_pairs`], and submits it.
+    ///
+    /// # Errors
+    /// As [`GpuFinder::record_pairs`].
+    pub fn submit_pairs(
+        &mut self,
+        boxes: &DeviceBoxes<'_>,
+    ) -> Result<(DevicePairs, wgpu::SubmissionIndex), GpuError> {
+        let device = self.device_now()?;
+        let mut encoder = device.encoder();
+        let pairs = self.record_on(&device, &mut encoder, boxes)?;
+        let submission = device.watch_now(|| Ok(device.submit(encoder)))?;
+        Ok((pairs, submission))
+    }
+
+    fn record_on(
+        &mut self,
+        device: &Arc<GpuDevice>,
+        encoder: &mut wgpu::CommandEncoder,
+        boxes: &DeviceBoxes<'_>,
+    ) -> Result<DevicePairs, GpuError> {
+        let kept = self.resident.take().filter(|kept| kept.suits(device, &self.options));
+        let mut resident = kept.unwrap_or_else(|| Resident::new(device, &self.options));
+        let result = device.watch_now(|| resident.record(encoder, boxes));
+        if matches!(result, Ok(_) | Err(GpuError::Argument(_) | GpuError::TooLarge { .. })) {
+            self.resident = Some(resident);
+        }
+        result
+    }
+
+    /// Returns the device, which a page has opened before.
+    fn device_now(&mut self) -> Result<Arc<GpuDevice>, GpuError> {
+        match &self.device {
+            Some(device) if !device.is_lost() => Ok(device.clone()),
+            _ => wait::block_on(self.open_device()),
+        }
     }
 
     async fn run(&mut self, job: &Job<'_>, found: &mut DeviceFound) -> Result<(), Failure> {

@@ -2,10 +2,10 @@
 
 use super::GpuError;
 use super::gpu_device::Variant;
-use super::storage::{BufferId, Side, Storage};
+use super::storage::Storage;
 use crate::layout::{
     self, CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Chunk, Counters, GROUPS_PER_ROW, LANES, LargeItem,
-    Located, Params, SHORT_ROW, SORTED, Slot, SmallItem, Totals, WINDOW,
+    Located, Params, SHORT_ROW, Slot, SmallItem, Totals, WINDOW,
 };
 use pbig_core::Pair;
 use pbig_shaders::{self as shaders, Buffer, Kernel};
@@ -38,11 +38,10 @@ use Buffer::{Dispatches, LongRows};
 use Groups::{Direct, Indirect};
 use Step::{Clear, Run, RunOnRows};
 
-/// Returns the steps that turn boxes into work items, without a round trip to the host, check the first of these, and sort
-/// the pairs if the flags say so and these items are expected to be all.
-pub(super) fn map_and_check(params: &Params, is_all: bool) -> Vec<Step> {
+/// Returns the steps that turn boxes into work items, without a round trip to the host, and check the first of these.
+pub(super) fn map_and_check(params: &Params) -> Vec<Step> {
     let by_box = Direct(params.boxes.div_ceil(LANES));
-    let mut steps = vec![
+    vec![
         CLEAR_TOTALS,
         Clear(Buffer::Cells, bytes_of::<Cell>(params.cells)),
         Clear(Buffer::Counters, bytes_of::<Counters>(1)),
@@ -55,16 +54,12 @@ pub(super) fn map_and_check(params: &Params, is_all: bool) -> Vec<Step> {
         Run(&shaders::ARRANGE, Direct(1)),
         Run(&shaders::CHECK_SMALL, Indirect(Dispatches, 0)),
         Run(&shaders::CHECK_LARGE, Indirect(Dispatches, 12)),
-    ];
-    if is_all && params.flags & SORTED != 0 {
-        steps.extend(sort(params));
-    }
-    steps
+    ]
 }
 
-/// Returns the steps that sort the pairs, where the chunk has all and they fit.
-pub(super) fn sort(params: &Params) -> [Step; 10] {
-    [
+/// Returns the steps that group pairs by first box, if the chunk has all items and the pairs fit. Their work is a few steps a pair.
+pub(super) fn group(params: &Params) -> Vec<Step> {
+    vec![
         Run(&shaders::ARRANGE_ROWS, Direct(1)),
         Clear(Buffer::Rows, bytes_of::<u32>(params.boxes)),
         Clear(Buffer::Windows, windows_bytes(params)),
@@ -72,12 +67,25 @@ pub(super) fn sort(params: &Params) -> [Step; 10] {
         RunOnRows(&shaders::SCAN_BLOCKS, Direct(params.boxes.div_ceil(COUNTS_PER_BLOCK))),
         RunOnRows(&shaders::SCAN_SUMS, Direct(1)),
         Run(&shaders::PLACE_PAIRS, Indirect(Dispatches, 24)),
-        Run(&shaders::RANK_PAIRS, Indirect(Dispatches, 24)),
-        Run(&shaders::PLACE_WINDOWS, Indirect(LongRows, 0)),
-        Run(&shaders::RANK_WINDOWS, Indirect(LongRows, 0)),
     ]
 }
 
+/// Maximum number of pairs that one dispatch ranks. It reads up to [`SHORT_ROW`] others for each: two billion in all.
+pub(super) const MOST_RANKED: u32 = 1 << 22;
+const _: () = assert!(MOST_RANKED as u64 * SHORT_ROW as u64 <= 1 << 31, "as many as the tests of a dispatch");
+
+/// The numbers of workgroups with which all grouped pairs are ranked at once: at most [`MOST_RANKED`].
+pub(super) const ALL_GROUPED: Groups = Indirect(Dispatches, 24);
+
+/// Returns the steps that order grouped pairs in their rows, and long rows if these pairs are the last.
+pub(super) fn rank(groups: Groups, is_last: bool) -> Vec<Step> {
+    let long_rows =
+        [&shaders::PLACE_WINDOWS, &shaders::RANK_WINDOWS].map(|it| Run(it, Indirect(LongRows, 0)));
+    let steps = [Run(&shaders::RANK_PAIRS, groups)].into_iter();
+    steps.chain(long_rows.into_iter().filter(|_| is_last)).collect()
+}
+
+/// Returns the steps that check a chunk.
 pub(super) fn check(items: &Chunk) -> [Step; 2] {
     let Chunk { small_items, large_items, .. } = *items;
     [Run(&shaders::CHECK_SMALL, Direct(small_items)), Run(&shaders::CHECK_LARGE, Direct(large_items))]
@@ -130,12 +138,16 @@ pub(super) fn make_sort_buffers(
 ) -> Result<(), GpuError> {
     storage.ensure(Buffer::Rows, bytes_of::<u32>(params.boxes))?;
     storage.ensure(Buffer::Grouped, 4 * words)?;
-    let pairs = storage.size(Buffer::Grouped) / size_of::<Pair>() as u64;
-    params.pair_capacity = u32::try_from(pairs).unwrap_or(u32::MAX);
+    params.pair_capacity = pair_capacity(storage);
     let pieces = most_long_rows(params.pair_capacity);
     storage.ensure(LongRows, 4 * (u64::from(layout::FIRST_PIECE) + 3 * pieces))?;
     storage.ensure(Buffer::Windows, windows_bytes(params))?;
     Ok(())
+}
+
+/// Returns the maximum number of pairs that can be sorted.
+pub(super) fn pair_capacity(storage: &Storage) -> u32 {
+    u32::try_from(storage.size(Buffer::Grouped) / size_of::<Pair>() as u64).unwrap_or(u32::MAX)
 }
 
 /// Returns the maximum number of long rows of this number of pairs, which is also that of their pieces.
@@ -159,8 +171,7 @@ pub(super) fn lists_fit(params: &Params, found: &Counters) -> bool {
 /// A submission that is being recorded.
 pub(super) struct Recording<'a> {
     pub(super) storage: &'a mut Storage,
-    pub(super) encoder: wgpu::CommandEncoder,
-    pub(super) side: Side,
+    pub(super) encoder: &'a mut wgpu::CommandEncoder,
     pub(super) variant: Variant,
     pub(super) queries: Option<&'a wgpu::QuerySet>,
     pub(super) passes: Vec<&'static Kernel>,
@@ -176,7 +187,7 @@ impl Recording<'_> {
         for &step in steps {
             match step {
                 Clear(buffer, bytes) => {
-                    let buffer = self.storage.get(BufferId::of(buffer, self.side));
+                    let buffer = self.storage.get(buffer);
                     self.encoder.clear_buffer(buffer, 0, Some(bytes));
                 }
                 Run(_, Direct(0)) => {}
@@ -206,7 +217,7 @@ impl Recording<'_> {
             let pipeline = self.storage.device.pipeline(kernel, variant);
             pass.insert_debug_marker(kernel.name);
             pass.set_pipeline(&pipeline);
-            pass.set_bind_group(0, &self.storage.bind_group(kernel, variant, self.side, &pipeline), &[]);
+            pass.set_bind_group(0, &self.storage.bind_group(kernel, variant, &pipeline), &[]);
             match groups {
                 Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
                 Indirect(buffer, at) => pass.dispatch_workgroups_indirect(self.storage.get(buffer), at),

@@ -57,13 +57,14 @@ impl Timestamps {
     }
 }
 
-/// Records the copies that end a submission: the header, and the first `prefetch` bytes of output, about as many as the
-/// last call needed (PBIG 5.3).
-pub(super) fn record(recording: &mut Recording<'_>, timestamps: Option<&Timestamps>, prefetch: u64) {
-    let Recording { storage, encoder, side, passes, .. } = recording;
-    let staging = storage.get(BufferId::Staging(*side));
+/// Records the copies that end a submission: the header, and the first `prefetch` bytes of output. Returns their bytes.
+pub(super) fn record(recording: &mut Recording<'_>, timestamps: Option<&Timestamps>, prefetch: u64) -> u64 {
+    let Recording { storage, encoder, passes, .. } = recording;
+    let staging = storage.get(BufferId::Staging);
+    let mut copied = 0;
     let mut copy = |buffer, at, bytes| {
-        encoder.copy_buffer_to_buffer(storage.get(BufferId::of(buffer, *side)), 0, staging, at, bytes);
+        copied += bytes;
+        encoder.copy_buffer_to_buffer(storage.get(buffer), 0, staging, at, bytes);
     };
     copy(Buffer::Counters, 0, TOTALS_AT);
     copy(Buffer::Totals, TOTALS_AT, TICKS_AT - TOTALS_AT);
@@ -74,7 +75,9 @@ pub(super) fn record(recording: &mut Recording<'_>, timestamps: Option<&Timestam
         let used = 2 * passes.len() as u32;
         encoder.resolve_query_set(&timestamps.queries, 0..used, &timestamps.resolved, 0);
         encoder.copy_buffer_to_buffer(&timestamps.resolved, 0, staging, TICKS_AT, u64::from(used) * 8);
+        copied += u64::from(used) * 8;
     }
+    copied
 }
 
 /// The content of a staging buffer, read where it lies.

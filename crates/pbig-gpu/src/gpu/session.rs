@@ -45,6 +45,8 @@ pub(super) struct Session {
     pub(super) cell_factor: f32,
     /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
     pub(super) split: Option<(usize, usize)>,
+    /// The call's ids of this job's boxes, if it is a part of the call.
+    pub(super) part_ids: Option<Vec<u32>>,
     /// Entries of this job's map, once fetched.
     pub(super) table: Option<Vec<u32>>,
     /// Parameters of this job.
@@ -63,6 +65,7 @@ impl Session {
             plan: None,
             cell_factor: 1.0,
             split: None,
+            part_ids: None,
             table: None,
             params: Params::default(),
             sink: Sink::default(),
@@ -114,12 +117,13 @@ impl Session {
             self.sizes.expected_words = 2 * job.boxes.len() as u64;
         }
         self.sizes.word_capacity = self.sizes.expected_words;
-        self.params = self.params_of(job);
+        let (boxes, has_filters) = (job.boxes.len() as u32, job.filters.is_some());
+        self.params = params_of(&self.options, &self.storage, boxes, has_filters, job.split.unwrap_or(0));
         let mut clock = Clock::start();
         // A failed upload leaves its bytes.
         self.storage.bytes_sent = 0;
         self.storage.upload(&[
-            // All of them: to find those that have changed, the host would have to read a copy of the last call's, too, which takes longer.
+            // All boxes: to find those that moved, the host would have to read a copy of the last call's, too.
             Upload::new(Buffer::Boxes, job.boxes),
             Upload::new(Buffer::Filters, job.filters.unwrap_or(&[])),
         ])?;
@@ -127,24 +131,6 @@ impl Session {
         report.uploaded += std::mem::take(&mut self.storage.bytes_sent);
         report.upload += clock.lap();
         Ok(())
-    }
-
-    /// Returns the bytes of a list whose length no call has told.
-    pub(super) fn first_bytes(&self) -> u64 {
-        self.options.first_bytes * (u64::from(self.params.boxes) + EXTRA_BOXES)
-    }
-
-    fn params_of(&self, job: &Job<'_>) -> Params {
-        Params {
-            boxes: job.boxes.len() as u32,
-            small_cell: self.options.small_cell.clamp(1, LANES),
-            // The output of a work item must fit the smallest buffer.
-            columns: if self.storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
-            flags: FILTERED * u32::from(job.filters.is_some())
-                + COUNTED * u32::from(self.options.count_tests),
-            split: job.split.unwrap_or(0),
-            ..Params::default()
-        }
     }
 
     /// Adds to the parameters what a plan and the coding of the output set.
@@ -169,8 +155,32 @@ impl Session {
     }
 }
 
+/// Returns the bytes of a list whose length no call has told.
+pub(super) fn first_bytes(options: &GpuOptions, boxes: u32) -> u64 {
+    options.first_bytes * (u64::from(boxes) + EXTRA_BOXES)
+}
+
+/// Returns the parameters of a call, without grid and capacities.
+pub(super) fn params_of(
+    options: &GpuOptions,
+    storage: &Storage,
+    boxes: u32,
+    has_filters: bool,
+    split: u32,
+) -> Params {
+    Params {
+        boxes,
+        small_cell: options.small_cell.clamp(1, LANES),
+        // The output of a work item must fit the smallest buffer.
+        columns: if storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
+        flags: FILTERED * u32::from(has_filters) + COUNTED * u32::from(options.count_tests),
+        split,
+        ..Params::default()
+    }
+}
+
 /// Returns an error if 32 bits might not count the entries of this number of boxes: up to 4 x 4 x 4 in each level but the last.
-fn check_entries(kept: &KeptPlan, boxes: u32) -> Result<(), GpuError> {
+pub(super) fn check_entries(kept: &KeptPlan, boxes: u32) -> Result<(), GpuError> {
     let entries = u64::from(boxes) * (64 * (kept.plan.levels.len() as u64 - 1) + 1);
     let limit = u64::from(u32::MAX);
     if entries > limit { Err(GpuError::TooLarge { what: "entries", bytes: entries, limit }) } else { Ok(()) }

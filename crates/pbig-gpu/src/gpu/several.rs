@@ -1,11 +1,11 @@
-//! One call on several devices (PBIG section 7): each gets a slab of the space, with the boxes that reach into it.
+//! One call on several devices (PBIG section 7): they share its parts, one block of boxes for each and the borders between these.
 
-use super::search::{name_pairs, of_ids, widest_axis};
-use super::{GpuError, GpuFinder};
+use super::error::Failure;
+use super::job::Job;
+use super::search::{Part, parts};
+use super::{GpuError, GpuFinder, wait};
 use crate::GpuOptions;
-use crate::layout::ordered;
-use crate::pbig::sampled;
-use pbig_core::{Aabb, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
+use pbig_core::{BoxIds, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 
 /// Fewest boxes for which a second device is asked.
 const FEWEST_BOXES: usize = 2048;
@@ -38,87 +38,49 @@ impl GpuFinders {
         Self { finders, ..self }
     }
 
-    /// Gives a slab to each device. Returns the answers, whose pairs have the ids of the caller.
-    fn find_slabs(&mut self, request: &SearchRequest<'_>) -> Vec<Result<DeviceFound, DeviceFailure>> {
+    /// Gives the parts to the devices in turn. Returns the answers, each with the index of its part.
+    fn find_parts(&mut self, job: &Job<'_>, parts: &[Part]) -> Vec<(usize, Answer)> {
+        let count = self.finders.len();
+        let take = |(first, finder): (usize, &mut GpuFinder)| -> Vec<_> {
+            (first..parts.len()).step_by(count).map(|i| (i, find(finder, job, &parts[i]))).collect()
+        };
         std::thread::scope(|scope| {
-            let slabs = slabs(request.boxes, self.finders.len()).into_iter();
-            let with_finders = slabs.zip(&mut self.finders);
-            let threads: Vec<_> =
-                with_finders.map(|(slab, finder)| scope.spawn(move || slab.find(finder, request))).collect();
-            let failed = |_| Err(DeviceFailure::Failed("the thread of a device ended".into()));
-            threads.into_iter().map(|thread| thread.join().unwrap_or_else(failed)).collect()
+            let finders = self.finders.iter_mut().enumerate();
+            let threads: Vec<_> = finders.map(|own| scope.spawn(|| take(own))).collect();
+            let failed = |_| vec![(0, Err(DeviceFailure::Failed("the thread of a device ended".into())))];
+            threads.into_iter().flat_map(|thread| thread.join().unwrap_or_else(failed)).collect()
         })
     }
 }
 
-/// The space of one device. A box is the slab's own if its lower corner is there.
-struct Slab {
-    axis: usize,
-    /// First coordinate of the slab, and first one beyond it, in ordered integers.
-    begin: i32,
-    end: i32,
+/// The answer of a device to a part.
+type Answer = Result<DeviceFound, DeviceFailure>;
+
+fn find(finder: &mut GpuFinder, job: &Job<'_>, part: &Part) -> Answer {
+    let (boxes, filters) = part.boxes_of(job);
+    let filters = filters.as_deref();
+    let job = Job { boxes: &boxes, filters, split: Some(part.split), is_sorted: false, ..*job };
+    let mut found = DeviceFound::default();
+    wait::block_on(finder.run(&job, &mut found)).map_err(Failure::for_core)?;
+    Ok(found)
 }
 
-impl Slab {
-    /// Finds the pairs whose later box is the slab's own, among the boxes that reach into the slab.
-    fn find(
-        &self,
-        finder: &mut GpuFinder,
-        request: &SearchRequest<'_>,
-    ) -> Result<DeviceFound, DeviceFailure> {
-        let is_own = |id: u32| ordered(request.boxes[id as usize].min[self.axis]) >= self.begin;
-        let ids = self.ids(request.boxes);
-        let (boxes, filters) = (of_ids(request.boxes, &ids), request.filters.map(|all| of_ids(all, &ids)));
-        let part = SearchRequest { boxes: &boxes, filters: filters.as_deref(), is_sorted: false, ..*request };
-        let mut found = DeviceFound::default();
-        finder.find_all(&part, &mut found).map_err(|failure| match failure {
-            // Some of them may belong to an earlier slab: the CPU counts exactly.
-            DeviceFailure::TooManyPairs => DeviceFailure::Declined("too many pairs in a slab".into()),
-            other => other,
-        })?;
-        name_pairs(&mut found.pairs, &ids);
-        found.pairs.retain(|pair| is_own(pair.a) || is_own(pair.b));
-        found.valid = ids.iter().filter(|&&id| is_own(id)).count() as u32;
-        Ok(found)
-    }
-
-    /// Returns the ids of the valid boxes that reach into the slab.
-    fn ids(&self, boxes: &[Aabb]) -> Vec<u32> {
-        let reaches =
-            |one: &Aabb| ordered(one.min[self.axis]) < self.end && ordered(one.max[self.axis]) >= self.begin;
-        let ids = (0..).zip(boxes).filter(|(_, one)| one.is_valid() && reaches(one));
-        ids.map(|(id, _)| id).collect()
-    }
-}
-
-/// Returns slabs with about equally many boxes of their own, along the axis on which they are spread most.
-fn slabs(boxes: &[Aabb], count: usize) -> Vec<Slab> {
-    let sample = sampled(boxes);
-    let axis = widest_axis(&sample);
-    let mut corners: Vec<i32> = sample.iter().map(|one| ordered(one.min[axis])).collect();
-    corners.sort_unstable();
-    let inner = (1..count).map(|i| corners.get(i * corners.len() / count).copied().unwrap_or(0));
-    let mut borders: Vec<i32> = [i32::MIN].into_iter().chain(inner).chain([i32::MAX]).collect();
-    // Boxes with one corner are not parted.
-    borders.dedup();
-    borders.windows(2).map(|two| Slab { axis, begin: two[0], end: two[1] }).collect()
-}
-
-/// Adds the answer of a slab to those before it.
-fn add(all: &mut DeviceFound, mut slab: DeviceFound) {
-    all.pairs.append(&mut slab.pairs);
-    all.valid += slab.valid;
-    all.checks.made += slab.checks.made;
-    all.checks.redundant += slab.checks.redundant;
-    all.checks.unnecessary += slab.checks.unnecessary;
-    let (sum, part) = (&mut all.report, slab.report);
+/// Adds the answer to a part to those before it.
+fn add(all: &mut DeviceFound, found: DeviceFound, part: &Part) -> Result<(), DeviceFailure> {
+    let fault = |i| DeviceFailure::Failed(format!("pair {i} of a part is not a < b < {}", part.ids.len()));
+    all.pairs.append_checked(&found.pairs, BoxIds::Part(&part.ids)).map_err(fault)?;
+    all.checks.made += found.checks.made;
+    all.checks.redundant += found.checks.redundant;
+    all.checks.unnecessary += found.checks.unnecessary;
+    let (sum, part) = (&mut all.report, found.report);
     sum.uploaded += part.uploaded;
     sum.downloaded += part.downloaded;
-    sum.device_bytes += part.device_bytes;
+    sum.device_bytes = sum.device_bytes.max(part.device_bytes);
     sum.chunks += part.chunks;
     sum.parts += part.parts;
     sum.repeats += part.repeats;
-    (sum.waits, all.plan) = (sum.waits.max(part.waits), slab.plan.or_else(|| all.plan.take()));
+    (sum.waits, all.plan) = (sum.waits.max(part.waits), found.plan.or_else(|| all.plan.take()));
+    Ok(())
 }
 
 impl PairDevice for GpuFinders {
@@ -130,9 +92,12 @@ impl PairDevice for GpuFinders {
         if self.finders.len() < 2 || request.boxes.len() < FEWEST_BOXES {
             return self.finders[0].find_all(request, found);
         }
-        for answer in self.find_slabs(request) {
-            add(found, answer?);
+        let job = Job::all(request);
+        let parts = parts(&job, request.boxes.len().div_ceil(self.finders.len()));
+        for (i, answer) in self.find_parts(&job, &parts) {
+            add(found, answer?, &parts[i])?;
         }
+        found.valid = job.valid();
         let is_too_many = found.pairs.len() as u64 > request.max_pairs;
         if is_too_many { Err(DeviceFailure::TooManyPairs) } else { Ok(()) }
     }

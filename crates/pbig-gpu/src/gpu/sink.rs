@@ -2,7 +2,7 @@
 
 use super::{Failure, GpuPlan};
 use crate::layout::{COUNTED, Params, Totals, wide};
-use pbig_core::{DeviceFound, Pair};
+use pbig_core::{DeviceFound, PairList};
 use pbig_shaders::{Kernel, Stage};
 use std::time::Duration;
 
@@ -18,7 +18,7 @@ pub(super) struct Sink {
 
 impl Sink {
     /// Returns an empty result with the memory of `pairs`.
-    pub(super) fn new(mut pairs: Vec<Pair>, max_pairs: u64) -> Self {
+    pub(super) fn new(mut pairs: PairList, max_pairs: u64) -> Self {
         pairs.clear();
         let mut found = DeviceFound::default();
         (found.pairs, found.report.parts) = (pairs, 1);

@@ -1,15 +1,20 @@
 //! The buffers of a finder on the device, and the bind groups made of them. Buffers grow when needed and shrink when they
-//! are hardly used. Lists go up through one staging buffer, which stays mapped between calls: the host copies each list once.
+//! are hardly used. Each list goes up through a staging buffer, which stays mapped between calls: threads write it there once.
 
 use super::GpuError;
 use super::gpu_device::{GpuDevice, Variant};
 use crate::GpuOptions;
+use crate::layout::{BOX_BITS, DeviceBox};
 use bytemuck::Pod;
 use pbig_core::internal::{self as parallel, threads_for};
 use pbig_shaders::{Buffer, Kernel};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Maximum number of boxes of one cell: their work items, 2^17 rows by 2^17 / 8 groups of 8 columns, fit 32 bits.
+const MAX_BOXES_PER_CELL: u64 = 1 << 25;
+const _: () = assert!(MAX_BOXES_PER_CELL <= 1 << BOX_BITS, "an entry names each box");
 
 /// Calls after which a buffer is freed if none of them used a quarter of it.
 const CALLS_PER_WINDOW: u32 = 64;
@@ -23,53 +28,45 @@ const ALWAYS_KEPT_BYTES: u64 = 1 << 16;
 /// Bytes that a thread copies at a time: a multiple of [`wgpu::MAP_ALIGNMENT`].
 const PIECE_BYTES: usize = 1 << 19;
 
-/// One of the two sets of buffers for chunks, 0 or 1: two chunks can be in progress (PBIG 5.3).
-pub(super) type Side = usize;
-
 /// A buffer of a finder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum BufferId {
-    /// A buffer that kernels bind. Only those of a chunk have a second side.
-    Bound(Buffer, Side),
-    /// The buffer through which the host reads a chunk's output.
-    Staging(Side),
-    /// The buffer through which the host reads parts of other buffers.
-    FetchStaging,
-    /// The buffer through which the host writes into others.
-    UploadStaging,
+    /// A buffer that kernels bind.
+    Bound(Buffer),
+    /// The buffer through which the host reads the counts of a chunk.
+    Staging,
+    /// One of two buffers through which the host reads other buffers, piece by piece.
+    FetchStaging(usize),
+    /// The buffer through which the host writes a list.
+    UploadStaging(Buffer),
 }
 
 impl From<Buffer> for BufferId {
     fn from(buffer: Buffer) -> Self {
-        Self::Bound(buffer, 0)
+        Self::Bound(buffer)
     }
 }
 
 impl BufferId {
-    /// Returns the buffer for a binding in a submission on `side`.
-    pub(super) fn of(binding: Buffer, side: Side) -> Self {
-        match binding {
-            Buffer::Chunk | Buffer::Totals | Buffer::Out => Self::Bound(binding, side),
-            other => other.into(),
-        }
-    }
-
     fn name(self) -> &'static str {
         match self {
-            Self::Bound(buffer, _) => buffer.name(),
-            Self::Staging(_) => "staging",
-            Self::FetchStaging => "fetch staging",
-            Self::UploadStaging => "upload staging",
+            Self::Bound(buffer) => buffer.name(),
+            Self::Staging => "staging",
+            Self::FetchStaging(_) => "fetch staging",
+            Self::UploadStaging(_) => "upload staging",
         }
     }
 
     fn usage(self) -> wgpu::BufferUsages {
         use wgpu::BufferUsages as Usage;
         match self {
-            Self::Staging(_) | Self::FetchStaging => Usage::MAP_READ | Usage::COPY_DST,
-            Self::UploadStaging => Usage::MAP_WRITE | Usage::COPY_SRC,
-            Self::Bound(Buffer::Dispatches | Buffer::LongRows, _) => Usage::STORAGE | Usage::INDIRECT,
-            Self::Bound(buffer, _) if buffer.is_uniform() => Usage::UNIFORM | Usage::COPY_DST,
+            Self::Staging | Self::FetchStaging(_) => Usage::MAP_READ | Usage::COPY_DST,
+            Self::UploadStaging(_) => Usage::MAP_WRITE | Usage::COPY_SRC,
+            Self::Bound(Buffer::Dispatches | Buffer::LongRows) => Usage::STORAGE | Usage::INDIRECT,
+            Self::Bound(Buffer::PairCount) => {
+                Usage::STORAGE | Usage::INDIRECT | Usage::COPY_DST | Usage::COPY_SRC
+            }
+            Self::Bound(buffer) if buffer.is_uniform() => Usage::UNIFORM | Usage::COPY_DST,
             Self::Bound(..) => Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC,
         }
     }
@@ -96,6 +93,8 @@ struct KeptBuffer {
     buffer: wgpu::Buffer,
     /// Maximum number of bytes that a call of this window used.
     used: u64,
+    /// The host may write into this staging buffer.
+    is_mapped: Arc<AtomicBool>,
 }
 
 /// The buffers of a finder.
@@ -104,15 +103,15 @@ pub(super) struct Storage {
     pub(super) device: Arc<GpuDevice>,
     /// Largest size of a buffer, in bytes.
     pub(super) max_buffer_bytes: u64,
+    /// Largest size of all buffers together, in bytes.
+    max_total_bytes: u64,
     /// Bytes of lists that went up and were not yet reported.
     pub(super) bytes_sent: u64,
     buffers: HashMap<BufferId, KeptBuffer>,
-    /// The host may write into the staging buffer.
-    is_staging_mapped: Arc<AtomicBool>,
-    /// Copies from the staging buffer, which the next submission makes.
-    pub(super) copies: Option<wgpu::CommandEncoder>,
+    /// Copies from staging buffers, which the next submission makes, and the lists that they copy.
+    pub(super) copies: Option<(wgpu::CommandEncoder, Vec<Buffer>)>,
     /// Bind groups of the present buffers.
-    bind_groups: HashMap<(&'static str, Variant, Side), wgpu::BindGroup>,
+    bind_groups: HashMap<(&'static str, Variant), wgpu::BindGroup>,
     calls: u32,
 }
 
@@ -120,18 +119,23 @@ impl Storage {
     pub(super) fn new(device: Arc<GpuDevice>, options: &GpuOptions) -> Self {
         Self {
             max_buffer_bytes: device.max_buffer_bytes(options),
+            max_total_bytes: options.max_total_bytes,
             device,
             bytes_sent: 0,
             buffers: HashMap::new(),
-            is_staging_mapped: Arc::default(),
             copies: None,
             bind_groups: HashMap::new(),
             calls: 0,
         }
     }
 
-    /// Makes a buffer at least `bytes` long. Returns true if it is new: a buffer that has to grow loses its content.
-    pub(super) fn ensure(&mut self, id: impl Into<BufferId>, bytes: u64) -> Result<bool, GpuError> {
+    /// Returns the most boxes that fit every buffer.
+    pub(super) fn max_boxes(&self) -> u64 {
+        (self.max_buffer_bytes / size_of::<DeviceBox>() as u64).min(MAX_BOXES_PER_CELL)
+    }
+
+    /// Makes a buffer at least `bytes` long. A buffer that has to grow loses its content.
+    pub(super) fn ensure(&mut self, id: impl Into<BufferId>, bytes: u64) -> Result<(), GpuError> {
         let (id, limit) = (id.into(), self.max_buffer_bytes);
         if bytes > limit {
             return Err(GpuError::TooLarge { what: id.name(), bytes, limit });
@@ -139,17 +143,25 @@ impl Storage {
         let bytes = bytes.max(MIN_BUFFER_BYTES);
         if let Some(kept) = self.buffers.get_mut(&id).filter(|kept| kept.buffer.size() >= bytes) {
             kept.used = kept.used.max(bytes);
-            return Ok(false);
+            return Ok(());
         }
-        // A quarter more, so that a growing scene does not allocate with every call.
-        let size = (bytes + bytes / 4).min(limit).next_multiple_of(MIN_BUFFER_BYTES);
         // The old buffer goes first, because both at once may not fit.
         self.buffers.remove(&id);
         self.bind_groups.clear();
-        let is_mapped = id == BufferId::UploadStaging;
+        // A quarter more, so that a growing scene does not allocate with every call.
+        let size = (bytes + bytes / 4).min(limit).next_multiple_of(MIN_BUFFER_BYTES);
+        self.check_total(id, size)?;
+        let is_mapped = matches!(id, BufferId::UploadStaging(_));
         let buffer = self.device.buffer(id.name(), size, id.usage(), is_mapped)?;
-        self.buffers.insert(id, KeptBuffer { buffer, used: bytes });
-        Ok(true)
+        let is_mapped = Arc::new(AtomicBool::new(is_mapped));
+        self.buffers.insert(id, KeptBuffer { buffer, used: bytes, is_mapped });
+        Ok(())
+    }
+
+    /// Returns an error if a buffer of this size would exceed the limit of all together.
+    fn check_total(&self, id: BufferId, size: u64) -> Result<(), GpuError> {
+        let (bytes, limit) = (self.bytes() + size, self.max_total_bytes);
+        if bytes > limit { Err(GpuError::OverBudget { what: id.name(), bytes, limit }) } else { Ok(()) }
     }
 
     /// Returns a buffer that [`Storage::ensure`] has made.
@@ -174,33 +186,53 @@ impl Storage {
         Ok(())
     }
 
-    /// Makes the buffers of lists, and writes these into the staging buffer, from where the next submission copies them.
+    /// Makes a uniform anew. Commands that were recorded keep the old one.
+    pub(super) fn replace<T: Pod>(&mut self, uniform: Buffer, value: &T) -> Result<(), GpuError> {
+        let (id, bytes) = (BufferId::from(uniform), bytemuck::bytes_of(value));
+        let buffer = self.device.buffer(id.name(), bytes.len() as u64, id.usage(), true)?;
+        let mut view = buffer.get_mapped_range_mut(..).map_err(|_| self.device.give_up())?;
+        view.copy_from_slice(bytes);
+        drop(view);
+        buffer.unmap();
+        self.bind_groups.clear();
+        self.buffers.insert(id, KeptBuffer { buffer, used: bytes.len() as u64, is_mapped: Arc::default() });
+        Ok(())
+    }
+
+    /// Makes the buffers of lists, and writes these into staging buffers, from where the next submission copies them.
     pub(super) fn upload(&mut self, uploads: &[Upload<'_>]) -> Result<(), GpuError> {
         // A call that failed before it was submitted leaves copies behind.
         self.copies = None;
+        let (mut encoder, mut lists) = (self.device.encoder(), Vec::new());
         for upload in uploads {
+            // Kernels bind it even if it is empty.
             self.ensure(upload.buffer, upload.len())?;
+            if upload.len() == 0 {
+                continue;
+            }
+            let staging = self.stage(upload)?;
+            encoder.copy_buffer_to_buffer(&staging, 0, self.get(upload.buffer), 0, upload.len());
+            self.bytes_sent += upload.len();
+            lists.push(upload.buffer);
         }
-        let bytes: u64 = uploads.iter().map(|upload| aligned(upload.len())).sum();
-        self.bytes_sent += uploads.iter().map(Upload::len).sum::<u64>();
-        if bytes > self.max_buffer_bytes {
-            // Each list fits a buffer, but not all together.
-            let write = |up: &Upload<'_>| self.device.queue.write_buffer(self.get(up.buffer), 0, up.bytes);
-            uploads.iter().for_each(write);
-            return Ok(());
-        }
-        if bytes == 0 { Ok(()) } else { self.stage(bytes, uploads) }
+        self.copies = Some((encoder, lists));
+        Ok(())
     }
 
-    /// Writes lists into the staging buffer, and records their copies.
-    fn stage(&mut self, bytes: u64, uploads: &[Upload<'_>]) -> Result<(), GpuError> {
-        self.map_staging(bytes)?;
-        let pieces = self.record_copies(uploads);
-        let staging = self.get(BufferId::UploadStaging);
+    /// Writes a list into its staging buffer: each thread writes pieces of it straight into mapped memory.
+    fn stage(&mut self, upload: &Upload<'_>) -> Result<wgpu::Buffer, GpuError> {
+        let id = BufferId::UploadStaging(upload.buffer);
+        // A call that failed has left the buffer to the device.
+        if self.buffers.get(&id).is_some_and(|kept| !kept.is_mapped.load(Ordering::Acquire)) {
+            self.buffers.remove(&id);
+        }
+        self.ensure(id, upload.len())?;
+        let kept = &self.buffers[&id];
+        let pieces: Vec<&[u8]> = upload.bytes.chunks(PIECE_BYTES).collect();
         let has_failed = AtomicBool::new(false);
         parallel::run(threads_for(pieces.len()), pieces.len(), |_, i| {
-            let (from, piece) = pieces[i];
-            match staging.get_mapped_range_mut(from..from + piece.len() as u64) {
+            let (from, piece) = ((i * PIECE_BYTES) as u64, pieces[i]);
+            match kept.buffer.get_mapped_range_mut(from..from + piece.len() as u64) {
                 Ok(mut view) => view.copy_from_slice(piece),
                 Err(_) => has_failed.store(true, Ordering::Relaxed),
             }
@@ -208,64 +240,35 @@ impl Storage {
         if has_failed.into_inner() {
             return Err(self.device.give_up());
         }
-        staging.unmap();
-        self.is_staging_mapped.store(false, Ordering::Relaxed);
-        Ok(())
+        kept.buffer.unmap();
+        kept.is_mapped.store(false, Ordering::Relaxed);
+        Ok(kept.buffer.clone())
     }
 
-    /// Gives each list a place in the staging buffer, and records its copy. Returns the pieces that threads write there.
-    fn record_copies<'a>(&mut self, uploads: &[Upload<'a>]) -> Vec<(u64, &'a [u8])> {
-        let (mut pieces, mut from) = (Vec::new(), 0);
-        let mut encoder = self.device.encoder();
-        let staging = self.get(BufferId::UploadStaging);
-        for upload in uploads.iter().filter(|upload| upload.len() > 0) {
-            encoder.copy_buffer_to_buffer(staging, from, self.get(upload.buffer), 0, upload.len());
-            // Each but the last ends at a multiple of the alignment.
-            for piece in upload.bytes.chunks(PIECE_BYTES) {
-                pieces.push((from, piece));
-                from += piece.len() as u64;
-            }
-            from = aligned(from);
+    /// Asks for the staging buffers of lists back once the device has made its copies: the wait for the submission maps them.
+    pub(super) fn take_staging_back(&self, lists: &[Buffer]) {
+        for list in lists {
+            let kept = &self.buffers[&BufferId::UploadStaging(*list)];
+            let is_mapped = kept.is_mapped.clone();
+            kept.buffer.map_async(wgpu::MapMode::Write, .., move |result| {
+                is_mapped.store(result.is_ok(), Ordering::Release);
+            });
         }
-        self.copies = Some(encoder);
-        pieces
-    }
-
-    /// Makes a mapped staging buffer, unless there is one.
-    fn map_staging(&mut self, bytes: u64) -> Result<(), GpuError> {
-        if !self.is_staging_mapped.load(Ordering::Acquire) {
-            // A call that failed has left it to the device.
-            self.buffers.remove(&BufferId::UploadStaging);
-        }
-        if self.ensure(BufferId::UploadStaging, bytes)? {
-            self.is_staging_mapped = Arc::new(AtomicBool::new(true));
-        }
-        Ok(())
-    }
-
-    /// Asks for the staging buffer back once the device has made its copies: the wait for the submission maps it.
-    pub(super) fn take_staging_back(&self) {
-        let is_mapped = self.is_staging_mapped.clone();
-        let staging = self.get(BufferId::UploadStaging);
-        staging.map_async(wgpu::MapMode::Write, .., move |result| {
-            is_mapped.store(result.is_ok(), Ordering::Release);
-        });
     }
 
     pub(super) fn bind_group(
         &mut self,
         kernel: &'static Kernel,
         variant: Variant,
-        side: Side,
         pipeline: &wgpu::ComputePipeline,
     ) -> wgpu::BindGroup {
-        let key = (kernel.name, variant, side);
+        let key = (kernel.name, variant);
         if let Some(known) = self.bind_groups.get(&key) {
             return known.clone();
         }
         let entry = |(binding, &buffer): (u32, &Buffer)| wgpu::BindGroupEntry {
             binding,
-            resource: self.get(BufferId::of(variant.bound(buffer), side)).as_entire_binding(),
+            resource: self.get(variant.bound(buffer)).as_entire_binding(),
         };
         let entries: Vec<_> = (0..).zip(kernel.bindings).map(entry).collect();
         let layout = &pipeline.get_bind_group_layout(0);
@@ -287,9 +290,4 @@ impl Storage {
         self.bind_groups.clear();
         true
     }
-}
-
-/// Returns the next place at which a mapped range may begin.
-fn aligned(place: u64) -> u64 {
-    place.next_multiple_of(wgpu::MAP_ALIGNMENT)
 }

@@ -8,6 +8,7 @@ use crate::layout::Params;
 use crate::pbig::Summary;
 use pbig_core::Aabb;
 use pbig_shaders::Kernel;
+use std::sync::atomic::Ordering;
 
 /// The faults, a word of each one's report, and the numbers of submissions after which it is injected: shaders are compiled and
 /// buffers are made in the first call only, and each call submits, some of them several times.
@@ -53,6 +54,11 @@ impl GpuFinder {
     /// Returns the number of kernels that were compiled for the device.
     pub fn pipelines(&self) -> usize {
         self.device.as_ref().map_or(0, |device| device.pipelines())
+    }
+
+    /// Returns the number of buffers that were made on the device so far.
+    pub fn buffers_made(&self) -> u32 {
+        self.device.as_ref().map_or(0, |device| device.buffers_made.load(Ordering::Relaxed))
     }
 
     /// Returns the number of query sets that the finder holds.

@@ -55,6 +55,14 @@ pub(super) async fn map(
 }
 
 impl GpuDevice {
+    /// Runs `work`. The page is told of errors, and cannot wait for them.
+    pub(super) fn watch_now<T>(&self, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
+        work()
+    }
+
+    /// Does nothing: the browser calls back.
+    pub(super) fn poll_now(&self) {}
+
     /// Returns true: a lost device does not refuse commands, but it maps no buffer.
     pub(super) fn is_alive(&self) -> bool {
         true

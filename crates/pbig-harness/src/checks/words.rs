@@ -1,6 +1,6 @@
 //! Words of a device, and saved bytes, that may be anything: an error, or pairs as they may be; never a panic.
 
-use pbig_core::{Aabb, BroadPhase, Pair, ProxyFilter};
+use pbig_core::{Aabb, BoxIds, BroadPhase, PairList, ProxyFilter};
 use pbig_gpu::decode;
 
 /// A byte for the format, one for the number of boxes, one for that of entries; then words, entries first.
@@ -9,11 +9,11 @@ pub fn decode_words(data: &[u8]) {
     let words: Vec<u32> = rest.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
     let (entries, output) = words.split_at(words.len().min(usize::from(*entries)));
     let boxes = if format & 4 == 0 { u32::from(*boxes) } else { u32::MAX - u32::from(*boxes) };
-    let mut pairs: Vec<Pair> = Vec::new();
+    let (mut pairs, ids) = (PairList::default(), BoxIds::First(boxes));
     let found = match format & 3 {
-        0 => decode::plain(output, boxes, format & 16 != 0, &mut pairs),
-        1 => decode::records(output, entries, boxes, &mut pairs),
-        2 => decode::bits(output, boxes, &mut pairs),
+        0 => decode::plain(output, ids, format & 16 != 0, &mut pairs),
+        1 => decode::records(output, entries, ids, &mut pairs),
+        2 => decode::bits(output, ids, &mut pairs),
         _ => return snapshot(rest),
     };
     if found.is_err() {

@@ -77,7 +77,7 @@ async fn find(
     if !mode.comes_sorted {
         found.pairs.sort_unstable();
     }
-    Ok(found.pairs)
+    Ok(found.pairs.into_vec())
 }
 
 fn compare(found: &[Pair], wanted: &[Pair]) -> Result<(), String> {

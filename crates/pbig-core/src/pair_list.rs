@@ -1,0 +1,336 @@
+//! The list of pairs in a device's answer: checked while it is copied, or else in one pass of its own.
+
+use crate::Pair;
+use crate::parallel::{self, SharedSlice};
+use std::mem::MaybeUninit;
+use std::ops::{Deref, DerefMut};
+
+/// Number of pairs that a thread takes at a time.
+const PIECE: usize = 1 << 16;
+
+/// Number of pairs that are copied before they are checked: they are then in the first-level cache.
+const BLOCK: usize = 1 << 10;
+
+/// The pairs of a device's answer: a `Vec` that remembers how much of it was checked.
+///
+/// [`PairList::append_checked`] checks pairs while it copies them, so that each is read once from the place where it lies. Every
+/// other change makes the core check the whole list in a pass of its own.
+#[derive(Clone, Debug, Default)]
+pub struct PairList {
+    pairs: Vec<Pair>,
+    checked: Check,
+}
+
+/// The boxes that appended pairs name.
+#[derive(Clone, Copy, Debug)]
+pub enum BoxIds<'a> {
+    /// The first boxes of the request, this many.
+    First(u32),
+    /// A part of the request: its box `i` has this id.
+    Part(&'a [u32]),
+}
+
+impl BoxIds<'_> {
+    /// Returns the number of boxes.
+    pub fn boxes(&self) -> u32 {
+        match self {
+            Self::First(boxes) => *boxes,
+            Self::Part(ids) => ids.len() as u32,
+        }
+    }
+}
+
+/// The outcome of checks of the first pairs of a list.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Check {
+    /// Number of checked pairs. Each has `a < b`.
+    len: usize,
+    /// An id above all others.
+    end: u32,
+    is_disordered: bool,
+}
+
+impl PairList {
+    /// Appends pairs, and checks them on the way. Each is read once: they may lie in memory of a device, which is slow to read.
+    /// Threads share the work.
+    ///
+    /// # Errors
+    /// The index of a pair `(a, b)` that is not `a < b`, or that names no box. Then nothing was appended.
+    pub fn append_checked(&mut self, pairs: &[Pair], ids: BoxIds<'_>) -> Result<(), usize> {
+        let copy = |at: usize, to: &mut [MaybeUninit<Pair>]| copy_into(to, &pairs[at..at + to.len()]);
+        // SAFETY: the function writes each element.
+        unsafe { self.append_by(pairs.len(), copy, ids) }
+    }
+
+    /// Appends `len` pairs, which `copy(at, to)` writes from the pair `at` on.
+    ///
+    /// # Safety
+    /// `copy` writes each element of `to`.
+    unsafe fn append_by(
+        &mut self,
+        len: usize,
+        copy: impl Fn(usize, &mut [MaybeUninit<Pair>]) + Sync,
+        ids: BoxIds<'_>,
+    ) -> Result<(), usize> {
+        self.pairs.reserve(len);
+        let start = self.pairs.len();
+        let places = SharedSlice::new(&mut self.pairs.spare_capacity_mut()[..len]);
+        let checks = parallel::map(len.div_ceil(PIECE), |piece| {
+            let at = piece * PIECE;
+            // SAFETY: the place is inside the reserved memory, and no other piece has it. `copy` writes each element.
+            unsafe { write_piece(places.part(at..len.min(at + PIECE)), at, &copy, ids) }
+        });
+        let checks: Vec<Check> = checks.into_iter().collect::<Result<_, usize>>()?;
+        // SAFETY: as many pairs were reserved and written.
+        unsafe { self.pairs.set_len(start + len) };
+        if self.checked.len == start {
+            let is_in_order = |at: usize| at == 0 || self.pairs[at - 1] < self.pairs[at];
+            let add = |all: Check, next| all.before(next, is_in_order(all.len));
+            self.checked = checks.into_iter().fold(self.checked, add);
+        }
+        Ok(())
+    }
+
+    /// Returns true if each pair is `a < b` and names one of this number of boxes.
+    pub(crate) fn names_only(&mut self, boxes: usize) -> bool {
+        self.check() && (self.pairs.is_empty() || self.checked.end as usize <= boxes)
+    }
+
+    /// Returns true if all pairs were checked, and are in order, each once.
+    pub fn is_in_order(&self) -> bool {
+        self.checked.len == self.pairs.len() && !self.checked.is_disordered
+    }
+
+    /// Checks all pairs, unless they were. Returns false if one is not `a < b`.
+    fn check(&mut self) -> bool {
+        if self.checked.len == self.pairs.len() {
+            return true;
+        }
+        let (pairs, len) = (&self.pairs, self.pairs.len());
+        let checks = parallel::map(len.div_ceil(PIECE), |piece| {
+            let at = piece * PIECE;
+            let check = check_of(&pairs[at..len.min(at + PIECE)]);
+            check.map(|check| (check, at == 0 || pairs[at - 1] < pairs[at]))
+        });
+        let all = checks.into_iter().try_fold(Check::default(), |all, next| {
+            next.map(|(check, is_in_order)| all.before(check, is_in_order))
+        });
+        self.checked = all.unwrap_or_default();
+        all.is_some()
+    }
+
+    /// Returns the pairs.
+    pub fn into_vec(self) -> Vec<Pair> {
+        self.pairs
+    }
+}
+
+impl From<Vec<Pair>> for PairList {
+    fn from(pairs: Vec<Pair>) -> Self {
+        Self { pairs, checked: Check::default() }
+    }
+}
+
+impl Deref for PairList {
+    type Target = Vec<Pair>;
+
+    fn deref(&self) -> &Vec<Pair> {
+        &self.pairs
+    }
+}
+
+/// Forgets what was checked: the caller may change each pair.
+impl DerefMut for PairList {
+    fn deref_mut(&mut self) -> &mut Vec<Pair> {
+        self.checked = Check::default();
+        &mut self.pairs
+    }
+}
+
+impl Check {
+    /// Returns the check of these pairs and those after them. The border of the two may be out of order.
+    fn before(self, next: Self, is_border_in_order: bool) -> Self {
+        Self {
+            len: self.len + next.len,
+            end: self.end.max(next.end),
+            is_disordered: self.is_disordered || next.is_disordered || !is_border_in_order,
+        }
+    }
+}
+
+/// Writes the pairs from `at` on, and checks them block by block.
+///
+/// # Safety
+/// `copy` writes each element.
+unsafe fn write_piece(
+    to: &mut [MaybeUninit<Pair>],
+    at: usize,
+    copy: impl Fn(usize, &mut [MaybeUninit<Pair>]),
+    ids: BoxIds<'_>,
+) -> Result<Check, usize> {
+    let (mut all, mut last) = (Check::default(), None);
+    for block in to.chunks_mut(BLOCK) {
+        let first = at + all.len;
+        copy(first, block);
+        // SAFETY: the caller's promise.
+        let block = unsafe { written(block) };
+        let check = check_and_name(block, ids).map_err(|fault| first + fault)?;
+        all = all.before(check, last.as_ref() < block.first());
+        last = block.last().copied();
+    }
+    Ok(all)
+}
+
+fn copy_into(to: &mut [MaybeUninit<Pair>], pairs: &[Pair]) {
+    for (place, pair) in to.iter_mut().zip(pairs) {
+        place.write(*pair);
+    }
+}
+
+/// Returns written elements.
+///
+/// # Safety
+/// Each was written.
+unsafe fn written(pairs: &mut [MaybeUninit<Pair>]) -> &mut [Pair] {
+    // SAFETY: the caller's promise; a `MaybeUninit` has the layout of what it holds.
+    unsafe { std::slice::from_raw_parts_mut(pairs.as_mut_ptr().cast(), pairs.len()) }
+}
+
+/// Checks pairs, and gives their boxes the ids of the request. Returns the index of a fault.
+fn check_and_name(pairs: &mut [Pair], ids: BoxIds<'_>) -> Result<Check, usize> {
+    let boxes = ids.boxes();
+    let fault = |pairs: &[Pair]| pairs.iter().position(|pair| pair.a >= pair.b || pair.b >= boxes);
+    let check = check_of(pairs).filter(|check| check.end <= boxes);
+    let (Some(check), BoxIds::Part(ids)) = (check, ids) else {
+        return check.ok_or_else(|| fault(pairs).unwrap_or(0));
+    };
+    debug_assert_eq!(check.len, pairs.len());
+    pairs.iter_mut().for_each(|pair| *pair = Pair::new(ids[pair.a as usize], ids[pair.b as usize]));
+    check_of(pairs).ok_or(0)
+}
+
+/// Checks pairs. Returns none if one is not `a < b`.
+fn check_of(pairs: &[Pair]) -> Option<Check> {
+    // Without an early end, so that the compiler uses SIMD.
+    let (are_pairs, last) =
+        pairs.iter().fold((true, 0), |(all, last), pair| (all & (pair.a < pair.b), pair.b.max(last)));
+    let end = last.checked_add(u32::from(!pairs.is_empty()))?;
+    let is_disordered = !pairs.is_sorted_by(|one, next| one < next);
+    are_pairs.then_some(Check { len: pairs.len(), end, is_disordered })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    /// Returns pairs in order, for some pieces and blocks and a few more.
+    fn many() -> Vec<Pair> {
+        (0..2 * PIECE as u32 + 77).map(|i| Pair { a: i / 3, b: i / 3 + 1 + i % 3 }).collect()
+    }
+
+    fn end_of(pairs: &[Pair]) -> u32 {
+        pairs.iter().map(|pair| pair.b + 1).max().unwrap_or(0)
+    }
+
+    #[test]
+    fn each_pair_is_read_once_where_it_lies() {
+        let pairs = many();
+        let reads: Vec<AtomicU32> = pairs.iter().map(|_| AtomicU32::new(0)).collect();
+        let copy = |at: usize, to: &mut [MaybeUninit<Pair>]| {
+            for (i, place) in to.iter_mut().enumerate() {
+                reads[at + i].fetch_add(1, Ordering::Relaxed);
+                place.write(pairs[at + i]);
+            }
+        };
+        let mut list = PairList::default();
+        // SAFETY: each element is written.
+        let appended = unsafe { list.append_by(pairs.len(), copy, BoxIds::First(end_of(&pairs))) };
+        assert_eq!((appended, &*list), (Ok(()), &pairs));
+        assert!(list.names_only(end_of(&pairs) as usize) && list.is_in_order());
+        assert!(!list.names_only(end_of(&pairs) as usize - 1));
+        assert!(reads.iter().all(|reads| reads.load(Ordering::Relaxed) == 1));
+    }
+
+    #[test]
+    fn a_fault_in_any_block_is_found_and_nothing_is_appended() {
+        let pairs = many();
+        let boxes = end_of(&pairs);
+        for at in [0, 1, BLOCK - 1, BLOCK, PIECE - 1, PIECE, pairs.len() - 1] {
+            for fault in [
+                Pair { a: 9, b: 9 },
+                Pair { a: 9, b: 8 },
+                Pair { a: 9, b: boxes },
+                Pair { a: 9, b: u32::MAX },
+            ] {
+                let mut faulty = pairs.clone();
+                faulty[at] = fault;
+                let mut list = PairList::from(vec![Pair { a: 0, b: 1 }]);
+                assert_eq!(list.append_checked(&faulty, BoxIds::First(boxes)), Err(at), "{fault:?}");
+                assert_eq!(list.len(), 1);
+                *list = faulty;
+                assert!(!list.names_only(boxes as usize), "{fault:?} at {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_out_of_order_or_twice_are_noticed_in_every_piece_and_between_two() {
+        let pairs = many();
+        let boxes = end_of(&pairs);
+        for at in [0, BLOCK - 1, BLOCK, PIECE - 1, PIECE, 2 * PIECE - 1, pairs.len() - 2] {
+            let mut swapped = pairs.clone();
+            swapped.swap(at, at + 1);
+            let mut twice = pairs.clone();
+            twice[at] = twice[at + 1];
+            for disordered in [swapped, twice] {
+                let mut list = PairList::default();
+                list.append_checked(&disordered, BoxIds::First(boxes)).expect("pairs");
+                assert!(list.names_only(boxes as usize) && !list.is_in_order(), "copied, {at}");
+                let mut list = PairList::from(disordered);
+                assert!(list.names_only(boxes as usize) && !list.is_in_order(), "in place, {at}");
+            }
+        }
+        let mut list = PairList::from(pairs);
+        assert!(list.names_only(boxes as usize) && list.is_in_order());
+    }
+
+    #[test]
+    fn parts_are_in_order_together_if_their_border_is() {
+        let pairs = many();
+        let boxes = BoxIds::First(end_of(&pairs));
+        let (first, second) = pairs.split_at(PIECE + 5);
+        for (parts, is_in_order) in
+            [([first, second], true), ([second, first], false), ([first, first], false)]
+        {
+            let mut list = PairList::default();
+            parts.iter().for_each(|part| list.append_checked(part, boxes).expect("pairs"));
+            assert_eq!(list.is_in_order(), is_in_order);
+        }
+    }
+
+    #[test]
+    fn a_changed_list_is_checked_again() {
+        let mut list = PairList::default();
+        list.append_checked(&many(), BoxIds::First(u32::MAX)).expect("pairs");
+        list[7].b = list[7].a;
+        assert!(!list.names_only(usize::MAX));
+        list[7].b += 1;
+        assert!(list.names_only(usize::MAX));
+        // An unchecked beginning is not forgotten.
+        list[7].b = list[7].a;
+        list.append_checked(&many(), BoxIds::First(u32::MAX)).expect("pairs");
+        assert!(!list.names_only(usize::MAX));
+    }
+
+    #[test]
+    fn pairs_of_a_part_get_the_ids_of_the_request() {
+        let mut list = PairList::default();
+        let of_part = [Pair { a: 0, b: 1 }, Pair { a: 1, b: 2 }];
+        list.append_checked(&of_part, BoxIds::Part(&[7, 3, 9])).expect("three boxes");
+        assert_eq!(*list, [Pair { a: 3, b: 7 }, Pair { a: 3, b: 9 }]);
+        assert!(list.names_only(10) && !list.names_only(9));
+        assert_eq!(list.append_checked(&of_part, BoxIds::Part(&[7, 3])), Err(1), "no third box");
+        assert_eq!(list.append_checked(&of_part, BoxIds::Part(&[7, 7, 7])), Err(0), "a box with itself");
+    }
+}
