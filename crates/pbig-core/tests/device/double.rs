@@ -58,7 +58,8 @@ impl Double {
             }
             Fault::IsSlow => std::thread::sleep(Duration::from_millis(2)),
             Fault::IsLost if calls > 2 => {
-                found.pairs.truncate(found.pairs.len() / 2);
+                let half = found.pairs.len() / 2;
+                found.pairs.truncate(half);
                 return Err(DeviceFailure::Failed("lost".into()));
             }
             Fault::Disorder => found.pairs.reverse(),
