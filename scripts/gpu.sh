@@ -180,8 +180,9 @@ run_validation() {
     validated ${enable}_SYNCHRONIZATION_VALIDATION_EXT $suite --test-threads=1
 }
 
-# Seconds for all that `device` measures and tests.
+# Seconds for all that `device` measures and tests, and the packages that do.
 device_seconds=480
+device_packages="-p pbig-cli -p pbig-studies -p pbig-examples -p pbig-tests"
 
 # on_device NAME COMMAND...: runs a command in what is left of the time, and notes its seconds and its status.
 on_device() {
@@ -195,8 +196,9 @@ on_device() {
 run_device() {
     local programs quick=() tests=(kernels:: gpu::) faults=0
     programs=$(target_folder)/release
-    step cargo build --release -p pbig-cli -p pbig-studies -p pbig-examples --example resident
-    step cargo test --release -p pbig-tests --test suite --no-run
+    # One choice of packages, which is one set of features: every crate is built once.
+    step cargo build --release $device_packages --bins --example resident
+    step cargo test --release $device_packages --test suite --no-run
     rm -rf "$out/device" && mkdir -p "$out/device"
     "$programs/pbig" doctor >"$out/device/doctor.txt"
     # A software adapter takes minutes for all tests.
@@ -206,7 +208,7 @@ run_device() {
     on_device resident "$programs/examples/resident"
     on_device bench "$programs/pbig" bench gpu "${quick[@]}" --write "$out/device"
     on_device papers_quick "$programs/pbig-studies" papers --quick --write "$out/device"
-    on_device suite cargo test --release -p pbig-tests --test suite -- "${tests[@]}"
+    on_device suite cargo test --release $device_packages --test suite -- "${tests[@]}"
     [ ${#quick[@]} -gt 0 ] || on_device papers "$programs/pbig-studies" papers --write "$out/device"
     [ "$faults" = 0 ]
 }
