@@ -1,4 +1,4 @@
-// What the map found, against what there is room for, and what the plan promised.
+// Comparisons of the counts of the map with the room for its lists, and with the tests that the plan promised.
 
 fn has_flag(flag: u32) -> bool {
     return (params.flags & flag) != 0u;

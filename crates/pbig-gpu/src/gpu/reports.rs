@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Maximum number of calls whose counts are on their way. Those of a call beyond stay on the device.
+/// Maximum number of calls whose counts are on their way. The counts of further calls stay on the device.
 const MOST_REPORTS: usize = 4;
 
 /// The counts of a call.

@@ -44,7 +44,7 @@ pub struct DevicePairs {
     pub count: wgpu::Buffer,
 }
 
-/// What a finder keeps for boxes that live on its device.
+/// The state of a finder for boxes that live on its device.
 #[derive(Debug)]
 pub(super) struct Resident {
     options: GpuOptions,
