@@ -1,5 +1,5 @@
 // Runs the module's sets with the kernels as they are, and with workgroups and lanes in other orders: a result that depends on
-// the order in which a GPU runs them would differ. Then it runs the parts: random sets and changes, faults, tiny limits, lost devices.
+// the order in which a GPU runs them would differ. Faults and limits of devices are tested natively, in tests/suite/gpu.
 
 // Puts a new order into a kernel's text: `group` and `lane` become functions of those that the device gives.
 function reordered(text, groupOf, laneOf) {
@@ -34,21 +34,6 @@ const faults = {
     "half-open boxes": (text) => text.replace("a.low[0] <= b.high[0]", "a.low[0] < b.high[0]"),
 };
 
-// Words by which a comparison tells a difference: of pairs, or of the words that the device returns. "Refused" would be no proof.
-const noticed = /missing: |spurious: |twice: |out of order|break the pair format|other events/;
-
-// Parts of the checks beside the modes. Some have devices with these limits.
-const parts = [
-    { name: "random sets" },
-    { name: "random changes" },
-    { name: "faults" },
-    { name: "tiny limits" },
-    { name: "a device of tiny limits", limits: { maxBufferSize: 2 ** 21, maxStorageBufferBindingSize: 2 ** 20 } },
-    { name: "a device that is refused", limits: { maxComputeInvocationsPerWorkgroup: 128 } },
-    { name: "a device that is refused", limits: { maxComputeWorkgroupsPerDimension: 1000 } },
-    { name: "lost devices" },
-];
-
 // Calls `work` while kernels are compiled from other texts.
 async function withTexts(change, work) {
     const prototype = GPUDevice.prototype;
@@ -61,50 +46,6 @@ async function withTexts(change, work) {
     } finally {
         prototype.createShaderModule = create;
     }
-}
-
-// Lets a device say that it has smaller limits, and make no larger buffer.
-function limited(device, limits) {
-    const { createBuffer, limits: given } = device;
-    const smaller = new Proxy(given, { get: (all, name) => limits[name] ?? all[name] });
-    Object.defineProperty(device, "limits", { value: smaller });
-    device.createBuffer = (descriptor) => {
-        const { maxBufferSize, maxStorageBufferBindingSize } = smaller;
-        const most = descriptor.usage & GPUBufferUsage.STORAGE ? maxStorageBufferBindingSize : maxBufferSize;
-        if (descriptor.size > most) throw new RangeError(`a buffer of ${descriptor.size} bytes, at most ${most}`);
-        return createBuffer.call(device, descriptor);
-    };
-    return device;
-}
-
-// Calls `work` while adapters give devices of smaller limits. WebGPU itself gives none that allows less than its defaults.
-async function withLimits(limits, work) {
-    const prototype = GPUAdapter.prototype;
-    const request = prototype.requestDevice;
-    prototype.requestDevice = async function (descriptor) {
-        return limited(await request.call(this, descriptor), limits);
-    };
-    try {
-        return await work();
-    } finally {
-        prototype.requestDevice = request;
-    }
-}
-
-// Ends with an error if a result does not come in time.
-async function inTime(seconds, what, result) {
-    let timer;
-    const late = new Promise((_, reject) => (timer = setTimeout(() => reject(new Error(`${what} hangs`)), 1000 * seconds)));
-    return Promise.race([result, late]).finally(() => clearTimeout(timer));
-}
-
-// Runs a part, and tells its counts. Returns true if none is zero and there is no fault.
-async function runPart(module, { name, limits = {} }, tell) {
-    const start = Date.now();
-    const { counts, names, fault } = await inTime(1800, name, withLimits(limits, () => module.run_part(name)));
-    const told = names.map((count, i) => `${counts[i]} ${count}`).join(", ");
-    tell(`${[name, ...Object.keys(limits)].join(", ")}: ${told}${fault}, ${Math.round((Date.now() - start) / 1000)} s`);
-    return fault === "" && counts.length > 0 && counts.every((count) => count > 0);
 }
 
 // Runs every mode on sets of at most this number of boxes, and tells a line for each.
@@ -139,14 +80,7 @@ async function checkAll(module, tell) {
         const { failed } = await withTexts(change, () => module.run(0, 300));
         tell(`planted fault, ${fault}: ${failed} sets failed`);
         isRight &&= failed > 0;
-        // An update drops pairs that come twice.
-        for (const name of fault === "no owner" ? ["random sets"] : ["random sets", "random changes"]) {
-            const part = await inTime(1800, name, withTexts(change, () => module.run_part(name)));
-            tell(`planted fault, ${fault}, ${name}: ${part.fault || "not noticed"}`);
-            isRight &&= noticed.test(part.fault);
-        }
     }
-    for (const part of parts) isRight = (await runPart(module, part, tell)) && isRight;
     const fault = await module.interrupt();
     tell(`a call that is given up, and another beside it: ${fault || "as they should be"}`);
     return isRight && fault === "";

@@ -1,13 +1,7 @@
-//! The corpus on WebGPU, in every mode of the pipeline, compared with brute force; and random sets and changes, faults, tiny limits
-//! and lost devices ([`parts`]). `wasm/gpu/run.mjs` calls it under node and in a browser.
+//! The corpus on WebGPU, in every mode of the pipeline, compared with brute force. `wasm/gpu/run.mjs` calls it under node and in a
+//! browser, whose compilers of kernels no native test uses.
 
-mod failing;
-mod limited;
-mod lost;
 mod modes;
-pub mod parts;
-mod random;
-mod relay;
 
 use crate::to_js;
 use modes::MODES;

@@ -12,7 +12,7 @@ pub(super) struct Mode {
     pub(super) most_boxes: usize,
     coding: Coding,
     /// The caller wants the pairs in order.
-    pub(super) is_sorted: bool,
+    is_sorted: bool,
     /// They come in order. Otherwise that is left to the core.
     comes_sorted: bool,
     has_grid: bool,
@@ -59,7 +59,7 @@ pub(super) async fn check(gpu: &mut GpuFinder, mode: &Mode, boxes: &[Aabb]) -> R
 }
 
 /// Makes filters that put every seventh box into one body, and even and odd boxes into groups.
-pub(super) fn filters(n: usize) -> Vec<ProxyFilter> {
+fn filters(n: usize) -> Vec<ProxyFilter> {
     let filter =
         |id: u32| ProxyFilter { body: id % 7, memberships: 1 + id % 2, mask: 3 - id % 3, ..ProxyFilter::ALL };
     (0..n as u32).map(filter).collect()
