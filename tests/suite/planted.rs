@@ -1,6 +1,7 @@
 //! Each checker notices the faults it is for: a dropped, a doubled, a swapped and a spurious pair.
 
 use pbig_core::{Aabb, Pair, ProxyFilter, oracle};
+use pbig_harness::follower::Follower;
 use pbig_harness::runner::{Run, Timed};
 use pbig_harness::scenes::Scene;
 use pbig_tests::{difference, set};
@@ -24,6 +25,23 @@ fn the_comparison_with_the_oracle_notices_each_fault() {
     assert!(noticed(&|pairs| pairs.swap(3, 4)).starts_with("out of order"));
     assert!(noticed(&|pairs| (pairs[5].a, pairs[5].b) = (pairs[5].b, pairs[5].a)).contains("not a < b"));
     assert!(noticed(&|pairs| pairs.push(Pair { a: 198, b: 5000 })).starts_with("spurious"));
+}
+
+#[test]
+fn the_follower_notices_an_event_that_it_never_got() {
+    // A pair that began unseen, and one that ended unseen.
+    for path in [[5.0, 0.3], [0.3, 5.0]] {
+        let mut world = Follower::new(pbig_core::BroadPhase::default(), 2);
+        let put = |world: &mut Follower, id, x| {
+            world.set(id, Aabb::from_center([x, 0.0, 0.0], [0.2; 3]), ProxyFilter::ALL).expect("a small id");
+        };
+        put(&mut world, 0, 0.0);
+        put(&mut world, 1, path[0]);
+        assert_eq!(world.update(), Ok(()));
+        put(&mut world, 1, path[1]);
+        world.broad_phase.update().expect("few pairs");
+        assert!(world.update().is_err_and(|why| why.contains("against the oracle")), "{path:?}");
+    }
 }
 
 /// Returns what is sent instead of an event of a pair. The other pair is far from the first.

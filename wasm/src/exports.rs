@@ -16,12 +16,10 @@ pub extern "C" fn keep_panics() {
     std::panic::set_hook(Box::new(|panic| *text() = panic.to_string()));
 }
 
-/// Runs all checks, and returns 1 if they passed, 0 otherwise.
+/// Runs all checks, of which the first that fails is a panic.
 #[unsafe(no_mangle)]
-pub extern "C" fn run() -> u32 {
-    let outcome = crate::run();
-    *text() = outcome.text;
-    outcome.has_passed.into()
+pub extern "C" fn run() {
+    *text() = crate::run();
 }
 
 /// Returns the address of the text, in UTF-8.

@@ -9,8 +9,6 @@ pub struct Follower {
     pub broad_phase: BroadPhase,
     /// By id; none for an absent box.
     pub boxes: Vec<Option<(Aabb, ProxyFilter)>>,
-    /// Changes the events of each update: a fault that the comparison must notice.
-    pub spoil: Box<dyn Fn(&mut Events)>,
     /// Sorted.
     pairs: Vec<Pair>,
     /// Ids removed since the last update.
@@ -20,11 +18,7 @@ pub struct Follower {
 impl Follower {
     /// Follows a broad phase without boxes, for ids below `ids`.
     pub fn new(broad_phase: BroadPhase, ids: usize) -> Self {
-        Self { broad_phase, boxes: vec![None; ids], spoil: Box::new(|_| ()), pairs: vec![], gone: vec![] }
-    }
-
-    pub fn ids(&self) -> usize {
-        self.boxes.len()
+        Self { broad_phase, boxes: vec![None; ids], pairs: vec![], gone: vec![] }
     }
 
     /// Returns true if a box is present, be it an invalid one.
@@ -36,15 +30,6 @@ impl Follower {
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), String> {
         self.boxes[id as usize] = Some((aabb, filter));
         self.broad_phase.set(id, aabb, filter).map_err(|error| error.to_string())
-    }
-
-    /// Sets all boxes in one call, without filters.
-    pub fn set_all(&mut self, boxes: &[Aabb]) -> Result<(), String> {
-        let all = |aabb: &Aabb| Some((*aabb, ProxyFilter::ALL));
-        self.boxes = boxes.iter().map(all).collect();
-        let ids: Vec<u32> = (0..boxes.len() as u32).collect();
-        let set = self.broad_phase.set_many(&ids, |id| all(&boxes[id as usize]));
-        set.map_err(|error| error.to_string())
     }
 
     /// Removes a box, if it is present.
@@ -96,8 +81,7 @@ impl Follower {
     /// The broad phase's own, and events that are out of order or end a pair that is not there.
     pub fn follow(&mut self) -> Result<(), String> {
         self.forget_gone();
-        let mut events = self.broad_phase.update().map_err(|error| error.to_string())?.clone();
-        (self.spoil)(&mut events);
+        let events = self.broad_phase.update().map_err(|error| error.to_string())?.clone();
         self.apply(&events)
     }
 
