@@ -17,8 +17,6 @@ pub mod field;
 pub mod files;
 pub mod follower;
 #[cfg(feature = "run")]
-pub mod gpu_model;
-#[cfg(feature = "run")]
 pub mod gpu_race;
 pub mod hard;
 #[cfg(feature = "files")]

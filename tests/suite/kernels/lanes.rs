@@ -1,7 +1,6 @@
 //! Idle lanes and loads, counted by texts that count what the kernel does instead of redundant tests.
 
 use super::*;
-use pbig_harness::gpu_model::Counts;
 
 /// Returns the number that a counting text has added to the redundant tests, and the tests.
 fn counted(kernel: &str, edits: &[[&str; 2]], before: &State) -> [u64; 2] {
@@ -80,21 +79,4 @@ fn a_small_item_loads_each_of_its_boxes_once() {
     needs_gpu!();
     let [loads, tests] = counted("check_small", &LOADS, &crowds());
     assert!(tests > 0 && loads > 0 && 4 * loads <= tests, "{loads} loads for {tests} tests");
-}
-
-/// The model of a call predicts how often boxes are loaded; the kernel counts it.
-#[test]
-fn the_model_predicts_the_loads_of_boxes() {
-    needs_gpu!();
-    let small_cell = GpuOptions::DEFAULT.small_cell;
-    let case = Case { name: "unit", boxes: set("unit", 30_000), small_cell, ..pile() };
-    let before = State::before("check_small", &case);
-    let [loads, tests] = counted("check_small", &LOADS, &before);
-    let (boxes, cells) = (f64::from(before.params.boxes), f64::from(before.params.cells));
-    let (entries, tests) = (f64::from(before.counters.entries), tests as f64);
-    let counts = Counts { boxes, cells, entries, tests, ..Counts::default() };
-    let [predicted, items] = [counts.box_loads(), counts.items()];
-    assert!((predicted / loads as f64 - 1.0).abs() < 0.2, "{loads} loads, not {predicted}");
-    let made = f64::from(before.counters.small_items);
-    assert!((items / made - 1.0).abs() < 0.1, "{made} items, not {items}");
 }

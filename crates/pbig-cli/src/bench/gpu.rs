@@ -2,7 +2,6 @@
 
 use pbig_core::{Aabb, Backend, Config, DeviceReport, Finder, Limits};
 use pbig_gpu::{GpuFinder, GpuOptions};
-use pbig_harness::gpu_model::{Counts, GPUS, Gpu};
 use pbig_harness::gpu_race::{on_device, race};
 use pbig_harness::prelude::*;
 
@@ -12,8 +11,8 @@ const ON_GPU: Config = Config { backend: Backend::Device, ..CONFIG };
 pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
     let head = vec![("adapter", gpu.adapter().to_owned()), ("software", gpu.is_software().to_string())];
-    let [searches, kernels, model] = searches(&gpu, quick)?;
-    let tables = vec![searches, kernels, model, events(&gpu, quick)?];
+    let [searches, kernels] = searches(&gpu, quick)?;
+    let tables = vec![searches, kernels, events(&gpu, quick)?];
     Ok(BenchReport { head, ..BenchReport::new("gpu", tables) })
 }
 
@@ -31,66 +30,37 @@ fn boxes(set: &str, n: usize) -> Vec<Aabb> {
     BoxSet::named(set).expect("a set of the harness").boxes(n, 1)
 }
 
-/// Returns the table of searches, that of their kernels, and that of what the model predicts: medians in ms of calls between which
-/// all boxes move. CPU and device take turns; `steady_ms` is of calls of the device alone, one right after the other, as idle
-/// devices lower their clocks. `predicted_ms` and `wait_ms` leave out the host's part. `wait_ms` and the columns after it are of the
-/// last of these calls, the times of kernels of calls after them.
-fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 3], Failure> {
-    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | steady_ms | predicted_ms | wait_ms | upload_ms | plan_ms | record_ms | decode_ms | uploaded_bytes | downloaded_bytes | device_bytes | compression";
+/// Returns the table of searches and that of their kernels: medians in ms of calls between which all boxes move. CPU and device take
+/// turns; `steady_ms` is of calls of the device alone, one right after the other, as idle devices lower their clocks. `wait_ms`
+/// leaves out the host's part. It and the columns after it are of the last of these calls, the times of kernels of calls after them.
+fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 2], Failure> {
+    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | steady_ms | wait_ms | upload_ms | plan_ms | record_ms | decode_ms | uploaded_bytes | downloaded_bytes | device_bytes | compression";
     let mut table = Table::new("searches", columns);
     let mut kernels = Table::new("kernels", "set | boxes | kernel | kernel_ms");
-    let mut model =
-        Table::new("model", "set | boxes | gpu | bytes_a_box | hottest_address | floor_ms | predicted_ms");
     let sets = ["uniform", "gaussian", "mixed"];
     let cases = sizes(gpu, quick).into_iter().flat_map(|n| sets.map(|set| (n, set)));
     // Ten million boxes of the set `gaussian` have over a billion pairs.
     let cases: Vec<_> = cases.filter(|case| *case != (10_000_000, "gaussian")).collect();
     for (n, set) in tracked(cases, "sets") {
-        let Some(Searched { ms: [cpu, on_gpu, steady], counts, report }) = search(gpu, set, n)? else {
+        let Some(Searched { ms: [cpu, on_gpu, steady], pairs, report }) = search(gpu, set, n)? else {
             table.row(cells![set, n]);
             continue;
         };
-        let predicted = known(gpu).map(|gpu| counts.predicted_ms(gpu));
-        let pairs = counts.pairs as u64;
-        let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, steady, predicted];
+        let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, steady];
         let parts = [report.wait, report.upload, report.plan, report.record, report.decode];
         let bytes = cells![report.uploaded, report.downloaded, report.device_bytes, report.compression];
         table.row(cells![..times, ..parts.map(milliseconds), ..bytes]);
         for (name, time) in &report.kernels {
             kernels.row(cells![set, n, *name, milliseconds(*time)]);
         }
-        for gpu in &GPUS {
-            let (bytes, hottest) = (counts.bytes(gpu) / n as f64, counts.hottest());
-            let [floor, predicted] = [counts.floor_ms(gpu), counts.predicted_ms(gpu)];
-            model.row(cells![set, n, gpu.name, bytes, hottest, floor, predicted]);
-        }
     }
-    Ok([table, kernels, model])
-}
-
-/// Returns the GPU of the model with the adapter's name, if the model has it. The table `model` has all.
-fn known(gpu: &GpuFinder) -> Option<&'static Gpu> {
-    GPUS.iter().find(|known| gpu.adapter().contains(known.name))
-}
-
-/// Returns what the model asks for. The finder has just searched on the device.
-fn counts(finder: &Finder, report: &DeviceReport) -> Counts {
-    let rows = finder.pairs().chunk_by(|one, other| one.a == other.a);
-    Counts {
-        boxes: finder.report().boxes as f64,
-        cells: report.cells as f64,
-        entries: report.entries as f64,
-        tests: finder.report().checks.made as f64,
-        pairs: finder.pairs().len() as f64,
-        longest_row: rows.map(<[_]>::len).max().unwrap_or(0) as f64,
-        has_visits: finder.report().plan.to_string().matches(" of ").count() > 1,
-    }
+    Ok([table, kernels])
 }
 
 struct Searched {
     /// Medians on the CPU and on the device in turn, and on the device alone.
     ms: [f64; 3],
-    counts: Counts,
+    pairs: usize,
     /// Report of the last call, with the times of kernels.
     report: DeviceReport,
 }
@@ -124,13 +94,13 @@ fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<Option<Searched>, Fail
     let [cpu, both] = times.map(|times| Spread::of(times).median);
     let steady = Spread::of(repeat(&mut on_gpu)?).median;
     let mut report = on_device(on_gpu.report())?.clone();
-    let counts = counts(&on_gpu, &report);
+    let pairs = on_gpu.pairs().len();
     // Calls whose kernels are timed take longer.
     let options = GpuOptions { time_kernels: true, ..GpuOptions::DEFAULT };
     let mut timed = Finder::with_device(ON_GPU, Box::new(gpu.clone().with_options(options)));
     repeat(&mut timed)?;
     report.kernels.clone_from(&on_device(timed.report())?.kernels);
-    Ok(Some(Searched { ms: [cpu, both, steady], counts, report }))
+    Ok(Some(Searched { ms: [cpu, both, steady], pairs, report }))
 }
 
 fn time(finder: &mut Finder, boxes: &[Aabb]) -> Result<f64, Failure> {

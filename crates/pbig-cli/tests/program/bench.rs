@@ -74,9 +74,6 @@ fn bench_gpu_has_both_backends() {
     let tables = tables("gpu");
     let searches = rows(&tables, "searches");
     assert!(searches.len() == 6 && searches.iter().all(|row| number(row, "cpu_over_gpu") > 0.0));
-    let model = rows(&tables, "model");
-    let is_whole = |row: &Value| number(row, "predicted_ms") > number(row, "floor_ms");
-    assert!(model.len() == 4 * searches.len() && model.iter().all(is_whole));
     let events = rows(&tables, "events");
     assert_eq!(events.len(), 3);
     for row in events {
