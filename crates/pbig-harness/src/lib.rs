@@ -30,8 +30,6 @@ pub mod pair_index;
 #[cfg(feature = "run")]
 pub mod prelude;
 #[cfg(feature = "run")]
-pub mod queries;
-#[cfg(feature = "run")]
 pub mod report;
 #[cfg(feature = "run")]
 pub mod runner;
@@ -41,4 +39,4 @@ pub mod table;
 #[cfg(feature = "run")]
 pub use pbig_chart as chart;
 #[cfg(feature = "run")]
-pub use pbig_scenes::{frames, pair_order, scenes, world};
+pub use pbig_scenes::{pair_order, scenes, world};

@@ -1,7 +1,5 @@
-//! Runs a scene step by step. Measures the broad phase, the whole step and its scene queries, and checks the pairs if asked to.
+//! Runs a scene step by step. Measures the broad phase and the whole step, and checks the pairs if asked to.
 
-use crate::frames::FrameKind;
-use crate::queries::{Answer, FrameQueries};
 use crate::scenes::Scene;
 use crate::world::World;
 pub use pbig_scenes::times::{StepTime, Summary};
@@ -83,22 +81,12 @@ pub struct Run<B> {
     pub world: World,
     pub broad_phase: Timed<B>,
     pub times: Vec<StepTime>,
-    pub hits: u64,
-    queries: Option<FrameQueries>,
 }
 
 impl<B: BroadPhase> Run<B> {
     pub fn new(scene: Scene, bodies: usize, seed: u64, broad_phase: B) -> Self {
-        Self::in_world(scene.build(bodies, seed), broad_phase)
-    }
-
-    pub fn in_world(world: World, broad_phase: B) -> Self {
-        Self { world, broad_phase: Timed::new(broad_phase), times: Vec::new(), hits: 0, queries: None }
-    }
-
-    /// Adds scene queries to each [`Run::frame`].
-    pub fn with_queries(self, kind: FrameKind) -> Self {
-        Self { queries: FrameQueries::new(kind, &self.world), ..self }
+        let world = scene.build(bodies, seed);
+        Self { world, broad_phase: Timed::new(broad_phase), times: Vec::new() }
     }
 
     /// Adds a checker, see [`Timed::checked`].
@@ -122,7 +110,7 @@ impl<B: BroadPhase> Run<B> {
         self.world.step(&mut self.broad_phase);
         let step = milliseconds(clock.elapsed() - std::mem::take(&mut self.broad_phase.checking));
         let broad_phase = milliseconds(self.broad_phase.take());
-        self.times.push(StepTime { broad_phase, step, queries: 0.0, frame: step });
+        self.times.push(StepTime { broad_phase, step, ..StepTime::default() });
     }
 
     /// Pairs that the narrow phase knows: edges of contacts and of intersections.
@@ -136,18 +124,6 @@ impl<B: BroadPhase> Run<B> {
         self.broad_phase.first_difference()?;
         let file = folder.join(format!("pbig-{scene}-{}-failed.npy", self.times.len()));
         Some(write_frames(&file, &self.broad_phase.checker()?.frames).map(|()| file))
-    }
-}
-
-impl<B: BroadPhase + Answer> Run<B> {
-    /// One step and its scene queries, measured.
-    pub fn frame(&mut self) {
-        self.step();
-        let (Some(queries), Some(time)) = (&mut self.queries, self.times.last_mut()) else { return };
-        let clock = Instant::now();
-        self.hits += queries.ask(&self.world, &self.broad_phase.inner);
-        time.queries = milliseconds(clock.elapsed());
-        time.frame += time.queries;
     }
 }
 
@@ -185,19 +161,6 @@ impl fmt::Display for Spread {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_frame_is_a_step_and_its_queries() {
-        for (kind, has_queries) in [(FrameKind::None, false), (FrameKind::Rays100, true)] {
-            let scene = Scene::named("column").expect("the scene exists");
-            let mut run = Run::new(scene, 50, 1, DefaultBroadPhase::new()).with_queries(kind);
-            (0..5).for_each(|_| run.frame());
-            assert_eq!((run.times.len(), run.hits > 0), (5, has_queries));
-            for time in &run.times {
-                assert_eq!((time.frame, time.queries > 0.0), (time.step + time.queries, has_queries));
-            }
-        }
-    }
 
     #[test]
     fn spread_by_hand() {

@@ -5,10 +5,8 @@ pub(crate) mod memory;
 mod step;
 mod update;
 
-use crate::options::{BODIES, whole};
 use crate::studies;
 use clap::ValueEnum;
-use pbig_harness::frames::FrameKind;
 use pbig_harness::output::Failure;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -27,13 +25,6 @@ pub(crate) struct Args {
     /// Write the numbers as CSV, and the charts, into this folder.
     #[arg(long, value_name = "DIR")]
     write: Option<PathBuf>,
-    /// Numbers of boxes for `steady`, instead of its own.
-    #[arg(long, value_name = "N,N", value_parser = whole::<usize>(BODIES), value_delimiter = ',', allow_negative_numbers = true)]
-    boxes: Vec<usize>,
-    /// Scene queries after each step of `step`, several kinds separated by commas: none, ray, rays-100, rays-10000, rays-to-middle,
-    /// cast, character, boxes or point.
-    #[arg(long, value_name = "KIND", value_delimiter = ',', value_parser = FrameKind::named)]
-    queries: Vec<FrameKind>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -53,15 +44,9 @@ enum Suite {
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    if !args.boxes.is_empty() && args.suite != Suite::Steady {
-        return Err(Failure::Input("--boxes is for `pbig bench steady`, not for other suites".into()));
-    }
-    if !args.queries.is_empty() && args.suite != Suite::Step {
-        return Err(Failure::Input("--queries is for `pbig bench step`, not for other suites".into()));
-    }
     let report = match args.suite {
         Suite::Update => update::run(args.quick)?,
-        Suite::Step => step::run(args.quick, &args.queries),
+        Suite::Step => step::run(args.quick),
         Suite::Gpu => gpu::run(args.quick)?,
         Suite::Peers | Suite::Steady | Suite::Papers => return forward(args),
     };
@@ -73,9 +58,5 @@ fn forward(args: &Args) -> Result<(), Failure> {
     let flags = [("--json", args.json), ("--quick", args.quick)];
     let mut options: Vec<OsString> = flags.iter().filter(|flag| flag.1).map(|flag| flag.0.into()).collect();
     options.extend(args.write.iter().flat_map(|folder| ["--write".into(), folder.into()]));
-    if !args.boxes.is_empty() {
-        let boxes: Vec<String> = args.boxes.iter().map(usize::to_string).collect();
-        options.extend(["--boxes".into(), boxes.join(",").into()]);
-    }
     studies::run(name.get_name(), options)
 }
