@@ -39,8 +39,6 @@ pub enum FrameKind {
     Ray,
     Rays100,
     Rays10000,
-    /// Rays from all sides to the middle, as in rapier's program `ray_cast3`.
-    RaysToMiddle,
     Cast,
     /// One move of a character controller with a capsule.
     Character,
@@ -50,12 +48,11 @@ pub enum FrameKind {
 }
 
 impl FrameKind {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 8] = [
         Self::None,
         Self::Ray,
         Self::Rays100,
         Self::Rays10000,
-        Self::RaysToMiddle,
         Self::Cast,
         Self::Character,
         Self::Boxes,
@@ -69,7 +66,6 @@ impl FrameKind {
             Self::Ray => "ray",
             Self::Rays100 => "rays-100",
             Self::Rays10000 => "rays-10000",
-            Self::RaysToMiddle => "rays-to-middle",
             Self::Cast => "cast",
             Self::Character => "character",
             Self::Boxes => "boxes",
@@ -91,7 +87,7 @@ impl FrameKind {
         match self {
             Self::None => 0,
             Self::Rays100 => 100,
-            Self::Rays10000 | Self::RaysToMiddle => 10_000,
+            Self::Rays10000 => 10_000,
             Self::Ray | Self::Cast | Self::Character | Self::Boxes | Self::Point => 1,
         }
     }
@@ -131,17 +127,7 @@ impl Extent {
     }
 
     pub fn queries(self, kind: FrameKind, frame: u64) -> impl Iterator<Item = Query> {
-        (0..kind.queries()).map(move |number| match kind {
-            FrameKind::RaysToMiddle => self.query_to_middle(number),
-            _ => self.query(frame, number),
-        })
-    }
-
-    /// Returns a query from a sphere around the middle to the middle: the same ones in every frame.
-    fn query_to_middle(&self, number: u64) -> Query {
-        let random = |part| 2.0 * unit(0, number, part) - 1.0;
-        let direction = Vec3::new(random(0), random(1), random(2)).normalize_or(Vec3::Y);
-        Query { origin: 0.5 * (self.min + self.max) - MAX_DISTANCE_METRES * direction, direction }
+        (0..kind.queries()).map(move |number| self.query(frame, number))
     }
 
     /// Returns the centre of the character's capsule in the first frame: beside all bodies, above a ground at height 0.

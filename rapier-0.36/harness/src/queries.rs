@@ -42,7 +42,7 @@ impl FrameQueries {
         let hits_of: fn(&QueryPipeline<'_>, Query) -> usize = match self.kind {
             FrameKind::None => return 0,
             FrameKind::Character => return self.walk(queries),
-            FrameKind::Ray | FrameKind::Rays100 | FrameKind::Rays10000 | FrameKind::RaysToMiddle => ray,
+            FrameKind::Ray | FrameKind::Rays100 | FrameKind::Rays10000 => ray,
             FrameKind::Cast => cast,
             FrameKind::Boxes => area,
             FrameKind::Point => point,
