@@ -1,7 +1,7 @@
 //! Memory comes back after a peak is over, piece by piece, and a clone copies no scratch. Bytes are counted, on one thread.
 
 use pbig_core::{Aabb, BroadPhase, Config, Finder, ProxyFilter};
-use pbig_harness::counting::{held, peak};
+use pbig_harness::counting::{held, peak, requests};
 
 const BOXES: u32 = 60_000;
 
@@ -79,6 +79,19 @@ fn memory_comes_back_without_changes_and_without_boxes() {
         broad_phase.shrink_to_fit();
         let shrunk = held() - start;
         assert!(shrunk < 50_000, "{shrunk} bytes for 100 boxes");
+    });
+}
+
+#[test]
+fn updates_in_a_steady_state_ask_for_no_memory() {
+    on_one_thread(|| {
+        let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("no margin");
+        // To and fro, so that no list grows any more.
+        (0..40).for_each(|update| step(&mut broad_phase, update % 2, false));
+        let before = requests();
+        (40..60).for_each(|update| step(&mut broad_phase, update % 2, false));
+        assert!(!broad_phase.events().added.is_empty());
+        assert_eq!(requests(), before);
     });
 }
 

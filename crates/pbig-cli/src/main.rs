@@ -13,14 +13,9 @@ mod studies;
 mod usage;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use pbig_harness::counting::Counting;
 use pbig_harness::output::{Failure, finish, print};
 use std::ffi::OsString;
 use std::process::ExitCode;
-
-/// For `bench update`, which counts an update's requests for memory.
-#[global_allocator]
-static COUNTING: Counting<false> = Counting;
 
 /// Finds every pair of overlapping axis-aligned boxes.
 #[derive(Parser)]

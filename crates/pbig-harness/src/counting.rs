@@ -1,20 +1,11 @@
-//! An allocator that counts the memory that each thread requests and frees. Tests and measurements install it with
-//! `#[global_allocator]`. Without that all counts are 0.
+//! An allocator that counts the memory that each thread requests and frees. Tests install it with `#[global_allocator]`. Without that
+//! all counts are 0.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// The system's allocator, with sums for each thread, because tests run side by side. It counts from the start if `ALWAYS`, or
-/// after [`switch_on`], so that a benchmark's other sides do not pay for counting.
-pub struct Counting<const ALWAYS: bool>;
-
-static IS_ON: AtomicBool = AtomicBool::new(false);
-
-/// Counts from now on.
-pub fn switch_on() {
-    IS_ON.store(true, Relaxed);
-}
+/// The system's allocator, with sums for each thread, because tests run side by side.
+pub struct Counting;
 
 thread_local! {
     static HELD: Cell<i64> = const { Cell::new(0) };
@@ -24,10 +15,7 @@ thread_local! {
 }
 
 /// Counts bytes that are asked for and bytes that are given back.
-fn count<const ALWAYS: bool>(asked: usize, returned: usize) {
-    if !ALWAYS && !IS_ON.load(Relaxed) {
-        return;
-    }
+fn count(asked: usize, returned: usize) {
     // Where a thread ends its sums may be gone before the last block is.
     _ = HELD.try_with(|held| held.set(held.get() + asked as i64 - returned as i64));
     _ = HELD.try_with(|held| PEAK.try_with(|peak| peak.set(peak.get().max(held.get()))));
@@ -36,27 +24,27 @@ fn count<const ALWAYS: bool>(asked: usize, returned: usize) {
 }
 
 // SAFETY: all is left to the system's allocator.
-unsafe impl<const ALWAYS: bool> GlobalAlloc for Counting<ALWAYS> {
+unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count::<ALWAYS>(layout.size(), 0);
+        count(layout.size(), 0);
         // SAFETY: the caller's promise.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count::<ALWAYS>(layout.size(), 0);
+        count(layout.size(), 0);
         // SAFETY: the caller's promise.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn realloc(&self, old: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count::<ALWAYS>(size, layout.size());
+        count(size, layout.size());
         // SAFETY: the caller's promise.
         unsafe { System.realloc(old, layout, size) }
     }
 
     unsafe fn dealloc(&self, old: *mut u8, layout: Layout) {
-        count::<ALWAYS>(0, layout.size());
+        count(0, layout.size());
         // SAFETY: the caller's promise.
         unsafe { System.dealloc(old, layout) }
     }
@@ -87,7 +75,7 @@ mod tests {
     use super::*;
 
     #[global_allocator]
-    static COUNTING: Counting<true> = Counting;
+    static COUNTING: Counting = Counting;
 
     #[test]
     fn what_is_held_is_counted() {

@@ -6,8 +6,6 @@ use pbig_harness::field::Field;
 use pbig_harness::prelude::*;
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
-use rayon::prelude::*;
-use std::hint::black_box;
 
 /// The distance that boxes of these sets, with edges of 1 to 100, move in a frame: far beyond any margin.
 const DISTANCE: f32 = 1.0;
@@ -15,8 +13,7 @@ const DISTANCE: f32 = 1.0;
 /// Calls in which nothing has moved are measured together: one is shorter than a clock can tell.
 const STILL_CALLS: usize = 1000;
 
-/// Pbig's and rapier's own broad phase beside the same world, and the floor below both: the boxes of moved colliders are computed
-/// and nothing else, on one thread and on all.
+/// Pbig's and rapier's own broad phase beside the same world.
 struct Calls {
     field: Field,
     movers: Option<Movers>,
@@ -24,13 +21,10 @@ struct Calls {
     ours: PbigBroadPhase,
     stock: DefaultBroadPhase,
     events: Vec<BroadPhasePairEvent>,
-    boxes: Vec<rapier3d::parry::bounding_volume::Aabb>,
 }
 
 const OURS: usize = 0;
 const STOCK: usize = 1;
-const FLOOR: usize = 2;
-const FLOOR_PARALLEL: usize = 3;
 
 impl Calls {
     /// A world with two broad phases that know it. Without movers nothing moves.
@@ -42,7 +36,6 @@ impl Calls {
             ours: PbigBroadPhase::new(),
             stock: DefaultBroadPhase::new(),
             events: vec![],
-            boxes: vec![],
         };
         calls.modified.clone_from(&calls.field.colliders);
         calls.update(OURS);
@@ -57,19 +50,6 @@ impl Calls {
         self.field.call(broad_phase, &self.modified, &mut self.events);
     }
 
-    fn floor(&mut self, parallel: bool) {
-        let world = &self.field.world;
-        let reach = world.params.prediction_distance() / 2.0;
-        let aabb = |&handle: &ColliderHandle| world.colliders[handle].compute_collision_aabb(reach);
-        if parallel {
-            self.modified.par_iter().map(aabb).collect_into_vec(&mut self.boxes);
-        } else {
-            self.boxes.clear();
-            self.boxes.extend(self.modified.iter().map(aabb));
-        }
-        black_box(&mut self.boxes);
-    }
-
     fn prepare(&mut self, round: usize) {
         if let Some(movers) = &self.movers {
             self.modified = self.field.shift(&movers.of(round), DISTANCE);
@@ -80,10 +60,7 @@ impl Calls {
         let calls = if self.movers.is_none() { STILL_CALLS } else { 1 };
         let ((), time) = timed(|| {
             for _ in 0..calls {
-                match side {
-                    OURS | STOCK => self.update(side),
-                    _ => self.floor(side == FLOOR_PARALLEL),
-                }
+                self.update(side);
             }
         });
         Ok(time / calls as f64)
@@ -100,26 +77,20 @@ fn cases(quick: bool) -> impl Iterator<Item = UpdateCase> {
     all.filter(move |(_, boxes, _)| !quick || *boxes <= 10_000)
 }
 
-/// The sides of a call beside ours; the two floors only where all boxes move.
-const OTHERS: [(usize, &str); 3] =
-    [(STOCK, "stock"), (FLOOR, "floor, one thread"), (FLOOR_PARALLEL, "floor, all threads")];
-
 pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let mut table = Table::new("update", COMPARED);
     for case in tracked(cases(quick), "cases") {
         measure(case, Effort::new(quick), &mut table)?;
     }
     memory::peaks(quick, &mut table)?;
-    memory::requests_in_steady_state(quick, &mut table)?;
     Ok(BenchReport::new("update", vec![table]))
 }
 
-/// Appends the rows of a case.
+/// Appends the row of a case.
 fn measure((set, n, share): UpdateCase, effort: Effort, table: &mut Table) -> Result<(), Failure> {
     let boxes = BoxSet::named(set).expect("a set of the harness").boxes(n, 1);
-    let sides = if set == "uniform" && share == Some(1.0) { 4 } else { 2 };
     let mut calls = Calls::new(&boxes, share);
-    let times = measured(&mut calls, sides, effort, Calls::prepare, Calls::run)?;
+    let times = measured(&mut calls, 2, effort, Calls::prepare, Calls::run)?;
     let moved = match share {
         None => "nothing".into(),
         Some(1.0) => "all".into(),
@@ -127,8 +98,6 @@ fn measure((set, n, share): UpdateCase, effort: Effort, table: &mut Table) -> Re
     };
     let (case, pairs) = (format!("{set}, {moved} moved"), calls.ours.pair_count() as u64);
     let unit = if share.is_none() { ("us", 1e3) } else { MS };
-    for (side, name) in OTHERS.into_iter().take(times.len() - 1) {
-        table.row(compared(&case, n, pairs, unit, times[OURS], (name, times[side])));
-    }
+    table.row(compared(&case, n, pairs, unit, times[OURS], ("stock", times[STOCK])));
     Ok(())
 }

@@ -29,20 +29,18 @@ fn about(rows: &[Value], word: &str) -> usize {
 }
 
 #[test]
-fn bench_update_has_stock_the_floor_and_memory() {
+fn bench_update_has_stock_and_memory() {
     let tables = tables("update");
     let rows = rows(&tables, "update");
-    for word in ["stock", "floor, one thread", "floor, all threads", "nothing moved", "1% moved"] {
+    for word in ["stock", "nothing moved", "1% moved"] {
         assert!(about(rows, word) > 0, "{word}");
     }
     for row in rows.iter().filter(|row| row["other"].is_string()) {
         assert!(number(row, "other_over_pbig_median") > 0.0 && number(row, "pbig_mean") > 0.0, "{row}");
     }
     let memory = rows.iter().filter(|row| row["unit"] == "MB");
-    assert!(memory.clone().count() > 2);
+    assert_eq!(memory.clone().count(), 2);
     assert!(!cfg!(target_os = "linux") || memory.clone().all(|row| number(row, "pbig_median") > 0.0));
-    let requests: Vec<_> = rows.iter().filter(|row| row["unit"] == "requests").collect();
-    assert!(requests.len() > 2 && number(requests[0], "pbig_median") == 0.0, "{}", requests[0]);
 }
 
 #[test]
