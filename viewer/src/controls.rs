@@ -15,7 +15,6 @@ pub enum Action {
     Use(Choice),
     ThrowBall,
     NextColouring,
-    ToggleCells,
     ToggleHelp,
     SavePicture,
     Quit,
@@ -32,7 +31,7 @@ const fn bind(key: Key, name: &'static str, action: Action, help: &'static str) 
     Binding { key, name, action, help }
 }
 
-pub const BINDINGS: [Binding; 14] = [
+pub const BINDINGS: [Binding; 13] = [
     bind(Key::Space, "Space", Action::Pause, "pause or go on"),
     bind(Key::S, "S", Action::Step, "one step, then pause"),
     bind(Key::R, "R", Action::Reset, "build the scene again"),
@@ -42,8 +41,7 @@ pub const BINDINGS: [Binding; 14] = [
     bind(Key::Key2, "2", Action::Use(Choice::Cpu), "pbig on the CPU"),
     bind(Key::Key3, "3", Action::Use(Choice::Gpu), "pbig on the GPU"),
     bind(Key::T, "T", Action::ThrowBall, "throw a ball to where you look"),
-    bind(Key::C, "C", Action::NextColouring, "colour by shape, contacts, sleeping, cell"),
-    bind(Key::G, "G", Action::ToggleCells, "show the cells of pbig's grid"),
+    bind(Key::C, "C", Action::NextColouring, "colour by shape, contacts, sleeping"),
     bind(Key::H, "H", Action::ToggleHelp, "hide these keys"),
     bind(Key::P, "P", Action::SavePicture, "save a picture"),
     bind(Key::Escape, "Esc", Action::Quit, "quit"),
@@ -58,7 +56,6 @@ pub fn action_of(key: Key) -> Option<Action> {
 pub struct Controls {
     pub is_paused: bool,
     pub colouring: Colouring,
-    pub is_grid_shown: bool,
     pub is_help_shown: bool,
     pub is_ending: bool,
     pub is_saving: bool,
@@ -67,14 +64,7 @@ pub struct Controls {
 impl Controls {
     /// Returns the controls of a scene that runs, with its keys listed.
     pub fn new(colouring: Colouring) -> Self {
-        Self {
-            is_paused: false,
-            colouring,
-            is_grid_shown: false,
-            is_help_shown: true,
-            is_ending: false,
-            is_saving: false,
-        }
+        Self { is_paused: false, colouring, is_help_shown: true, is_ending: false, is_saving: false }
     }
 
     /// Does what a key asks for. `ball` is thrown if the key asks for one.
@@ -91,7 +81,6 @@ impl Controls {
             Action::Use(choice) => simulation.swap(choice),
             Action::ThrowBall => simulation.throw(ball),
             Action::NextColouring => self.colouring = self.colouring.next(),
-            Action::ToggleCells => self.is_grid_shown = !self.is_grid_shown,
             Action::ToggleHelp => self.is_help_shown = !self.is_help_shown,
             Action::SavePicture => self.is_saving = true,
             Action::Quit => self.is_ending = true,
@@ -100,13 +89,13 @@ impl Controls {
 
     /// Describes the state in one line, which the program prints after each key.
     pub fn describe(&self, simulation: &Simulation) -> String {
-        let Self { is_paused, colouring, is_grid_shown, is_help_shown, .. } = self;
+        let Self { is_paused, colouring, is_help_shown, .. } = self;
         let scene = simulation.setting.scene.name;
         let (backend, steps) = (simulation.choice, simulation.steps);
         let (bodies, pairs) = (simulation.world.bodies.len(), simulation.world.pair_count());
         format!(
             "scene={scene} bodies={bodies} step={steps} paused={is_paused} backend={backend:?} pairs={pairs} \
-             colouring={colouring:?} cells={is_grid_shown} help={is_help_shown}"
+             colouring={colouring:?} help={is_help_shown}"
         )
     }
 }

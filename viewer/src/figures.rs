@@ -24,8 +24,8 @@ pub struct Figures {
     pub error: Vec<String>,
     /// The algorithm and the reasons, broken into lines.
     pub plan: Vec<String>,
-    /// The legend of the colours, and what the cells show.
-    pub legend: String,
+    /// The legend of the colours.
+    pub legend: &'static str,
 }
 
 impl Figures {
@@ -43,18 +43,17 @@ impl Figures {
                 time_line("whole step", last[1], step),
             ],
             counts: counts_line(simulation.world.pair_count(), simulation.broad_phase.events()),
-            error: wrap(&error_text(pbig), LINE_CHARS),
-            plan: wrap(&plan_text(pbig), LINE_CHARS),
-            legend: legend_line(simulation, controls),
+            error: wrap(&error_text(pbig)),
+            plan: wrap(&plan_text(pbig)),
+            legend: controls.colouring.legend(),
         }
     }
 
     /// Returns all lines, top to bottom.
     pub fn lines(&self) -> Vec<&str> {
-        let head = [&self.scene, &self.broad_phase];
-        let rest = self.times.iter().chain([&self.counts]).chain(&self.error);
-        let rest = rest.chain(&self.plan).chain([&self.legend]);
-        head.into_iter().chain(rest).map(String::as_str).collect()
+        let head = [&self.scene, &self.broad_phase].into_iter().chain(&self.times).chain([&self.counts]);
+        let all = head.chain(&self.error).chain(&self.plan);
+        all.map(String::as_str).chain([self.legend]).collect()
     }
 }
 
@@ -92,28 +91,10 @@ fn plan_text(pbig: Option<&PbigBroadPhase>) -> String {
     }
 }
 
-fn legend_line(simulation: &Simulation, controls: &Controls) -> String {
-    let legend = controls.colouring.legend();
-    match (controls.is_grid_shown, simulation.broad_phase.pbig()) {
-        (false, _) => legend.to_owned(),
-        (true, None) => format!("{legend}; stock has no cells"),
-        (true, Some(_)) => format!("{legend}; cells shown"),
-    }
-}
-
-/// Breaks a text between words into lines of at most `chars` characters. A longer word has a line of its own.
-fn wrap(text: &str, chars: usize) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= chars => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
+/// Breaks a text between words; none for an empty one.
+fn wrap(text: &str) -> Vec<String> {
+    let lines = textwrap::wrap(text, LINE_CHARS).into_iter().map(Into::into);
+    lines.filter(|line: &String| !line.is_empty()).collect()
 }
 
 #[cfg(test)]
@@ -168,12 +149,5 @@ mod tests {
         );
         let none = figures(Choice::Cpu, 0).times;
         assert_eq!(none[1], "whole step 0.00 ms  (mean 0.00, p99 0.00)");
-    }
-
-    #[test]
-    fn text_is_broken_between_words() {
-        assert_eq!(wrap("one two three", 7), ["one two", "three"]);
-        assert_eq!(wrap("extraordinary a b", 3), ["extraordinary", "a b"]);
-        assert!(wrap("", 3).is_empty());
     }
 }

@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn nothing_leaves_the_screen() {
-        let controls = Controls { is_grid_shown: true, ..Controls::new(Colouring::Contacts) };
+        let controls = Controls::new(Colouring::Contacts);
         let min = MIN_SIZE.map(|pixels| pixels as f32);
         for size in [[1280.0, 800.0], [800.0, 600.0], [3840.0, 2160.0], [min[0], 2160.0], min] {
             let sheet = sheet(&controls, size);

@@ -6,12 +6,11 @@
 //! | `choice`, `simulation`, `history` | the broad phase, the world and their times; nothing here draws |
 //! | `controls` | keys and what they do |
 //! | `figures`, `graph`, `hud`, `sheet` | what is written over the picture, as texts and lines in pixels |
-//! | `shapes`, `palette`, `cells`, `framing` | parts of colliders as instances, their colours, the grid's cells, the camera |
+//! | `shapes`, `palette`, `framing` | parts of colliders as instances, their colours, the camera |
 //! | `draw`, `window`, `pictures` | drawing with kiss3d |
 
 #![allow(missing_docs, reason = "a program, whose names say most")]
 
-pub mod cells;
 pub mod choice;
 pub mod controls;
 pub mod draw;

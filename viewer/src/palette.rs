@@ -1,6 +1,5 @@
 //! The colour of each object.
 
-use crate::cells::Cells;
 use clap::ValueEnum;
 use pbig_scenes::drawn::Colour;
 use pbig_scenes::world::World;
@@ -16,8 +15,6 @@ pub enum Colouring {
     Contacts,
     /// Sleeping ones apart from awake ones.
     Sleeping,
-    /// By their cell in pbig's grid.
-    Cell,
 }
 
 /// A colour: red, green and blue from 0 to 1.
@@ -25,8 +22,6 @@ pub type Rgb = [f32; 3];
 
 /// Objects of fixed bodies.
 const FIXED: Rgb = [0.42, 0.44, 0.48];
-/// Objects that the colouring says nothing about.
-const PALE: Rgb = [0.62, 0.64, 0.68];
 /// Awake objects.
 const AWAKE: Rgb = [0.95, 0.55, 0.18];
 /// Sleeping objects.
@@ -39,7 +34,7 @@ const MOST_CONTACTS: f32 = 8.0;
 
 impl Colouring {
     /// Every colouring, in the order of the key.
-    pub const ALL: [Self; 4] = [Self::Shape, Self::Contacts, Self::Sleeping, Self::Cell];
+    pub const ALL: [Self; 3] = [Self::Shape, Self::Contacts, Self::Sleeping];
 
     /// Returns the one after this one; after the last comes the first.
     pub fn next(self) -> Self {
@@ -52,7 +47,6 @@ impl Colouring {
             Self::Shape => "colour: shape",
             Self::Contacts => "colour: contacts, none (blue) to 8 or more (red)",
             Self::Sleeping => "colour: awake (orange), sleeping (blue)",
-            Self::Cell => "colour: cell of pbig's grid (grey: none)",
         }
     }
 }
@@ -61,16 +55,15 @@ impl Colouring {
 pub struct Palette<'a> {
     colouring: Colouring,
     world: &'a World,
-    cells: &'a Cells,
     /// Objects touched, by the index of a collider; empty if the colouring does not need it.
     contacts: Vec<u32>,
 }
 
 impl<'a> Palette<'a> {
     /// Gathers what this colouring needs.
-    pub fn new(colouring: Colouring, world: &'a World, cells: &'a Cells) -> Self {
+    pub fn new(colouring: Colouring, world: &'a World) -> Self {
         let contacts = if colouring == Colouring::Contacts { count_contacts(world) } else { Vec::new() };
-        Self { colouring, world, cells, contacts }
+        Self { colouring, world, contacts }
     }
 
     /// Returns the colour of a part of a collider, by its colour class.
@@ -80,14 +73,8 @@ impl<'a> Palette<'a> {
         match self.colouring {
             Colouring::Shape => by_shape(class, handle.into_raw_parts().0),
             Colouring::Contacts => self.by_contacts(handle),
-            Colouring::Sleeping => {
-                if body.is_sleeping() {
-                    SLEEPING
-                } else {
-                    AWAKE
-                }
-            }
-            Colouring::Cell => self.cells.cell_of(handle).map_or(PALE, by_cell),
+            Colouring::Sleeping if body.is_sleeping() => SLEEPING,
+            Colouring::Sleeping => AWAKE,
         }
     }
 
@@ -126,15 +113,6 @@ fn by_shape(class: Colour, index: u32) -> Rgb {
     base.map(|part| (part * light).min(1.0))
 }
 
-/// Returns a colour for a cell. Neighbouring cells get hues far apart.
-fn by_cell(cell: [i64; 3]) -> Rgb {
-    // Steps by the golden ratio, which spread evenly over the circle of hues.
-    let turns = cell[0] as f64 * 0.618 + cell[1] as f64 * 0.387 + cell[2] as f64 * 0.171;
-    let hue = (turns.rem_euclid(1.0) * 6.0) as f32;
-    let part = |shift: f32| ((hue + shift).rem_euclid(6.0) - 3.0).abs() - 1.0;
-    [part(0.0), part(4.0), part(2.0)].map(|x| 0.2 + 0.7 * x.clamp(0.0, 1.0))
-}
-
 /// Returns the colour at a place of a scale, from 0 to 1.
 fn gradient(scale: &[Rgb], at: f32) -> Rgb {
     let at = at.clamp(0.0, 1.0) * (scale.len() - 1) as f32;
@@ -154,8 +132,7 @@ mod tests {
         let setting = Setting { scene: Scene::named(scene).unwrap(), bodies: 300, seed: 1 };
         let mut simulation = Simulation::new(setting, Choice::Cpu);
         (0..steps).for_each(|_| simulation.step());
-        let cells = Cells::of(&simulation);
-        let palette = Palette::new(colouring, &simulation.world, &cells);
+        let palette = Palette::new(colouring, &simulation.world);
         let bodies = simulation.world.colliders.iter().filter(|(_, collider)| collider.parent().is_some());
         bodies.map(|(handle, collider)| palette.colour(handle, collider, Colour::Ball)).collect()
     }
@@ -176,15 +153,6 @@ mod tests {
     fn sleeping_objects_have_their_own_colour() {
         assert_eq!(share(&colours("pile", 1, Colouring::Sleeping), |&c| c == AWAKE), 1.0);
         assert!(share(&colours("pile", 600, Colouring::Sleeping), |&c| c == SLEEPING) > 0.5);
-    }
-
-    #[test]
-    fn cells_have_several_colours() {
-        let mut colours = colours("column", 30, Colouring::Cell);
-        assert!(share(&colours, |&c| c != PALE) > 0.9);
-        colours.sort_by(|a, b| a.partial_cmp(b).unwrap());
-        colours.dedup();
-        assert!(colours.len() > 5, "{}", colours.len());
     }
 
     #[test]

@@ -79,13 +79,11 @@ pub fn has_ground(drawn: &Drawn) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cells::Cells;
     use crate::palette::Colouring;
     use rapier3d::na::DMatrix;
 
     fn instances_of(world: &World) -> Vec<Instance> {
-        let cells = Cells::default();
-        instances(world, &Drawn::new(world), &Palette::new(Colouring::Shape, world, &cells))
+        instances(world, &Drawn::new(world), &Palette::new(Colouring::Shape, world))
     }
 
     /// The lower and the upper corner of the box around instances of shapes that fill their cubes.

@@ -210,11 +210,8 @@ fn obey_looks(viewer: &mut Viewer) {
     let keys = [
         ("c", "NextColouring", "colouring", "Contacts"),
         ("c", "NextColouring", "colouring", "Sleeping"),
-        ("c", "NextColouring", "colouring", "Cell"),
-        ("g", "ToggleCells", "cells", "true"),
         ("h", "ToggleHelp", "help", "false"),
         ("h", "ToggleHelp", "help", "true"),
-        ("g", "ToggleCells", "cells", "false"),
         ("c", "NextColouring", "colouring", "Shape"),
     ];
     for (key, word, name, value) in keys {

@@ -3,10 +3,9 @@
 mod overlay;
 mod stage;
 
-use crate::cells::Cells;
 use crate::controls::Controls;
 use crate::framing::{FIELD_OF_VIEW, Framing};
-use crate::palette::{Colouring, Palette, Rgb};
+use crate::palette::{Palette, Rgb};
 use crate::shapes;
 use crate::sheet::Sheet;
 use crate::simulation::{Ball, Simulation};
@@ -97,14 +96,11 @@ impl View {
     }
 
     fn show(&mut self, simulation: &Simulation, controls: &Controls) {
-        let is_needed = controls.is_grid_shown || controls.colouring == Colouring::Cell;
-        let cells = if is_needed { Cells::of(simulation) } else { Cells::default() };
-        let palette = Palette::new(controls.colouring, &simulation.world, &cells);
+        let palette = Palette::new(controls.colouring, &simulation.world);
         if self.drawn.is_outdated(&simulation.world) {
             self.drawn = Drawn::new(&simulation.world);
         }
-        let instances = shapes::instances(&simulation.world, &self.drawn, &palette);
-        self.stage.show(&instances, if controls.is_grid_shown { &cells.occupied } else { &[] });
+        self.stage.show(&shapes::instances(&simulation.world, &self.drawn, &palette));
     }
 }
 

@@ -1,7 +1,6 @@
 //! Meshes, ground and light of a scene.
 
 use super::linear;
-use crate::cells::Cell;
 use crate::framing::Framing;
 use crate::palette::Rgb;
 use crate::shapes::{self, Instance, KINDS, Surface};
@@ -19,8 +18,6 @@ const GROUND_TILES: i32 = 64;
 const TILE_SHARE: f32 = 0.16;
 /// The opacity of sensors.
 const SENSOR_ALPHA: f32 = 0.3;
-/// The thickness of a cell's edges, as a share of the cell's.
-const EDGE_SHARE: f32 = 0.03;
 /// Longitudes and latitudes of a ball. Balls are small on the screen, and drawn by the ten thousand.
 const BALL_PARTS: [u32; 2] = [14, 8];
 
@@ -29,7 +26,6 @@ pub(super) struct Stage {
     pub(super) root: SceneNode3d,
     solids: [SceneNode3d; KINDS.len()],
     sensors: [SceneNode3d; KINDS.len()],
-    edges: SceneNode3d,
 }
 
 impl Stage {
@@ -52,19 +48,17 @@ impl Stage {
                 .set_color(Color::new(1.0, 1.0, 1.0, SENSOR_ALPHA))
                 .set_casts_shadows(false)
         });
-        let edges = root.add_cube(1.0, 1.0, 1.0).set_roughness(0.7).set_casts_shadows(false);
-        Self { root, solids, sensors, edges }
+        Self { root, solids, sensors }
     }
 
-    /// Places the instances and the cells' edges of this frame.
-    pub(super) fn show(&mut self, instances: &[Instance], cells: &[Cell]) {
+    /// Places the instances of this frame.
+    pub(super) fn show(&mut self, instances: &[Instance]) {
         for (nodes, is_sensor) in [(&mut self.solids, false), (&mut self.sensors, true)] {
             for (node, kind) in nodes.iter_mut().zip(KINDS) {
                 let shown = instances.iter().filter(|i| i.kind == kind && i.is_sensor == is_sensor);
                 place(node, &shown.map(instance).collect::<Vec<_>>());
             }
         }
-        place(&mut self.edges, &cells.iter().flat_map(cell_edges).collect::<Vec<_>>());
     }
 }
 
@@ -129,46 +123,5 @@ fn instance(instance: &Instance) -> InstanceData3d {
         deformation: Mat3::from_cols_array_2d(&instance.columns),
         color: linear(instance.colour, alpha),
         ..InstanceData3d::default()
-    }
-}
-
-/// Returns the twelve edges of a cell, as thin boxes.
-fn cell_edges(cell: &Cell) -> Vec<InstanceData3d> {
-    let (min, max) = (Vec3::from_array(cell.min), Vec3::from_array(cell.max));
-    let (middle, size) = (0.5 * (min + max), max - min);
-    let thick = EDGE_SHARE * size.min_element();
-    let edge = |axis: usize, corner: usize| {
-        let (mut position, mut extent) = (middle, Vec3::splat(thick));
-        extent[axis] = size[axis];
-        for (bit, other) in [(axis + 1) % 3, (axis + 2) % 3].into_iter().enumerate() {
-            position[other] = if corner >> bit & 1 == 0 { min[other] } else { max[other] };
-        }
-        let color = linear([0.05, 0.25 + 0.5 * cell.lightness, 0.15], 1.0);
-        InstanceData3d {
-            position,
-            deformation: Mat3::from_diagonal(extent),
-            color,
-            ..InstanceData3d::default()
-        }
-    };
-    (0..12).map(|i| edge(i / 4, i % 4)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_cell_has_twelve_edges_from_corner_to_corner() {
-        let cell = Cell { min: [0.0; 3], max: [1.0, 2.0, 3.0], lightness: 1.0 };
-        let edges = cell_edges(&cell);
-        let length = |edge: &InstanceData3d| (edge.deformation * Vec3::ONE).max_element();
-        let mut lengths: Vec<f32> = edges.iter().map(length).collect();
-        lengths.sort_by(f32::total_cmp);
-        assert_eq!(lengths, [[1.0; 4], [2.0; 4], [3.0; 4]].concat());
-        let mut places: Vec<_> = edges.iter().map(|edge| edge.position.to_array()).collect();
-        places.sort_by(|a, b| a.partial_cmp(b).unwrap());
-        places.dedup();
-        assert_eq!(places.len(), 12);
     }
 }
