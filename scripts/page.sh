@@ -31,19 +31,13 @@ check_folder() {
     fi
 }
 
-# build_module PACKAGE FOLDER [OPTION...]: a WebAssembly module, and the JavaScript beside it: rapier and pbig, or the GPU. The
-# module has SIMD, and no unwinding. The program that writes the JavaScript is small: optimizing it would take longer than it runs.
+# build_module PACKAGE FOLDER: a WebAssembly module, and the JavaScript beside it: rapier and pbig, or the GPU. The module
+# has SIMD, and no unwinding. The program that writes the JavaScript is small: optimizing it would take longer than it runs.
 build_module() {
     local package=$1 folder=$2
-    shift 2
     RUSTFLAGS="-C target-feature=+simd128" step "${cargo[@]}" build --locked --profile wasm --lib --package "$package" \
-        --target "$target" --target-dir "$built/wasm" "$@"
+        --target "$target" --target-dir "$built/wasm"
     step cargo run --quiet --locked --package pbig-page-bindgen -- "$built/wasm/$target/wasm/${package//-/_}.wasm" "$folder"
-}
-
-# build_native [OPTION...]: the native program whose pairs are compared with the module's.
-build_native() {
-    step cargo build --quiet --locked --release --package pbig-page --bin native_pairs "$@"
 }
 
 install_tools() {
@@ -68,22 +62,12 @@ bundle() {
     done
 }
 
-# build_deterministic: module and native program with mathematics that are the same on both sides.
-build_deterministic() {
-    local options="--no-default-features --features deterministic" folder=$built/deterministic
-    build_module pbig-page "$folder" $options
-    build_native $options
-    cp "$built/release/native_pairs" "$folder"
-    step "$tools/esbuild" "$folder/pbig_page.js" --bundle --format=esm --log-level=warning "$device" \
-        --outfile="$folder/pbig_page.mjs"
-}
-
-# test_page: the logic natively and in node, then the page in a browser, one test file after another.
+# test_page: the logic natively and in node, then the page in a browser, one test file after another; and the pairs of the native
+# program, with which the module's are compared.
 test_page() {
     step cargo test --quiet --locked --release --package pbig-page
-    build_deterministic
-    build_native
-    PAGE_FOLDER=$(cd "$out" && pwd) NATIVE_PAIRS=$built/release/native_pairs DETERMINISTIC=$built/deterministic \
+    step cargo build --quiet --locked --release --package pbig-page --bin native_pairs
+    PAGE_FOLDER=$(cd "$out" && pwd) NATIVE_PAIRS=$built/release/native_pairs \
         CHROMIUM=$(command -v chromium) SHOTS=$PWD/out/page-shots \
         step "$node" --test --test-reporter=spec --test-concurrency=1 page/tests/*.test.mjs
 }
