@@ -1,29 +1,23 @@
 //! Random operations on small worlds: each call of the broad phase is compared with rapier's own and with brute force. A
 //! failure shrinks to a few operations.
 //!
-//! The suite plays the same operations each time, about 110,000 on the CPU and 25,000 more on its engines one by one. With
-//! `PROPTEST_CASES=6400` it plays new ones: about 10^6 on the CPU, and 1.5 x 10^6 on its engines.
+//! The suite plays about 110,000 operations on the CPU and 25,000 more on its engines one by one. With `PBIG_RUNS=6400` it plays more:
+//! about 10^6 on the CPU, and 1.5 x 10^6 on its engines.
 
 mod ops;
 mod subject;
 
 use crate::checked::{on_cpu, on_gpu, pbig};
-use ops::{Act, Op, any_op};
+use ops::{Act, Op, any_ops};
 use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
 use pbig_tests::{Way, engines, needs_gpu};
-use proptest::collection::vec;
-use proptest::prelude::ProptestConfig;
-use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 use rand::RngExt;
 use rapier_pbig::shadow::Watcher;
 use rapier3d::prelude::*;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use subject::{Plant, Subject};
-
-/// Maximum number of operations in a list; half as many on average.
-const MOST_OPS: usize = 160;
 
 /// Sums over all runs.
 #[derive(Clone, Copy, Debug, Default)]
@@ -196,29 +190,35 @@ fn run(ops: &[Op], way: impl Into<Way>, plant: Plant) -> Result<Outcome, String>
 /// Why a list of operations fails a test, and the list.
 type Failure = (String, Vec<Op>);
 
-/// Tests random lists of operations until one fails, and makes that one small.
-fn try_random_ops(cases: u32, test: &impl Fn(&[Op]) -> Result<(), String>) -> Result<(), Failure> {
-    let config =
-        ProptestConfig { failure_persistence: None, max_shrink_iters: 5000, ..ProptestConfig::default() };
-    let mut runner = if std::env::var_os("PROPTEST_CASES").is_some() {
-        TestRunner::new(config)
-    } else {
-        let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
-        TestRunner::new_with_rng(ProptestConfig { cases, ..config }, rng)
-    };
-    let lists = vec(any_op(), 1..MOST_OPS);
-    runner.run(&lists, |ops| test(&ops).map_err(TestCaseError::fail)).map_err(|error| match error {
-        TestError::Fail(why, ops) => smallest((why.to_string(), ops), test),
-        TestError::Abort(why) => panic!("{why}"),
-    })
+/// Returns the number of runs that the environment asks for.
+fn given() -> Option<u64> {
+    std::env::var("PBIG_RUNS").ok().map(|runs| runs.parse().expect("PBIG_RUNS is a number of runs"))
 }
 
-/// Leaves out operations while the rest fails: proptest tries to leave each out only once.
+/// Tests random lists of operations until one fails, and makes that one small.
+fn try_random_ops(runs: u64, test: &impl Fn(&[Op]) -> Result<(), String>) -> Result<(), Failure> {
+    for run in 0..given().unwrap_or(runs) {
+        let ops = any_ops(run);
+        test(&ops).map_err(|why| smallest((why, ops), test))?;
+    }
+    Ok(())
+}
+
+/// Leaves out operations while the rest fails: many at once, then each alone until none can go.
 fn smallest((mut why, mut ops): Failure, test: &impl Fn(&[Op]) -> Result<(), String>) -> Failure {
-    let fails = |ops: Vec<Op>| test(&ops).err().map(|why| (why, ops));
-    let without = |ops: &[Op], i: usize| [&ops[..i], &ops[i + 1..]].concat();
-    while let Some(smaller) = (0..ops.len()).map(|i| without(&ops, i)).find_map(fails) {
-        (why, ops) = smaller;
+    let mut size = ops.len();
+    while size > 0 {
+        let (before, mut at) = (ops.len(), 0);
+        while at < ops.len() {
+            let rest = [&ops[..at], &ops[(at + size).min(ops.len())..]].concat();
+            match test(&rest) {
+                Err(other) => (why, ops) = (other, rest),
+                Ok(()) => at += size,
+            }
+        }
+        if size > 1 || ops.len() == before {
+            size /= 2;
+        }
     }
     (why, ops)
 }
@@ -228,13 +228,13 @@ fn listed(ops: &[Op]) -> String {
 }
 
 /// Runs a test on random lists of operations and sums up what happened in the runs that it returns.
-fn on_random_ops(cases: u32, test: impl Fn(&[Op]) -> Result<Outcome, String>) -> OperationCounts {
+fn on_random_ops(runs: u64, test: impl Fn(&[Op]) -> Result<Outcome, String>) -> OperationCounts {
     let sum = Cell::new(OperationCounts::default());
     let counted = |ops: &[Op]| -> Result<(), String> {
         sum.set(sum.get().plus(test(ops)?.tally));
         Ok(())
     };
-    if let Err((why, ops)) = try_random_ops(cases, &counted) {
+    if let Err((why, ops)) = try_random_ops(runs, &counted) {
         panic!("{why}\nafter these operations and a step:\n{}", listed(&ops));
     }
     sum.get()
@@ -247,7 +247,7 @@ fn random_worlds_agree_with_stock_and_the_oracle() {
         [cpu, grid].map(|config| on_random_ops(700, |ops| run(ops, config, Plant::Nothing)));
     let tally = on_cpu.plus(on_grid);
     tally.assert_that_much_happened();
-    assert!(tally.ops >= 100_000 || std::env::var_os("PROPTEST_CASES").is_some(), "{tally:?}");
+    assert!(tally.ops >= 100_000 || given().is_some(), "{tally:?}");
     for (_, way) in engines() {
         let way = way.with(|it| it.margin = cpu.margin);
         on_random_ops(100, |ops| run(ops, way, Plant::Nothing)).assert_that_much_happened();

@@ -5,14 +5,14 @@
 //! enabled on one, and kinematic targets are near.
 
 use pbig_harness::world::World;
-use proptest::prelude::{Strategy, any};
-use proptest::sample::select;
 use rand::rngs::SmallRng;
 use rand::seq::{IndexedRandom, IteratorRandom};
 use rand::{RngExt, SeedableRng};
 use rapier3d::prelude::*;
 use std::fmt;
-use std::iter::repeat_n;
+
+/// Maximum number of operations in a list; half as many on average.
+const MOST_OPS: usize = 160;
 
 /// No more bodies than this, and no more than twice as many colliders.
 const MOST_BODIES: usize = 40;
@@ -48,7 +48,7 @@ impl fmt::Debug for Op {
 }
 
 /// The operations, each with its weight. Failing ones shrink to the first.
-const OPS: [(usize, &str, Act); 28] = [
+const OPS: [(u32, &str, Act); 28] = [
     (28, "step", Act::Step),
     (2, "snapshot", Act::Snapshot),
     (2, "fresh broad phase", Act::Fresh),
@@ -79,10 +79,14 @@ const OPS: [(usize, &str, Act); 28] = [
     (1, "length unit", Act::World(measure)),
 ];
 
-/// Returns any operation.
-pub(super) fn any_op() -> impl Strategy<Value = Op> {
-    let rows: Vec<_> = OPS.iter().flat_map(|row| repeat_n(*row, row.0)).collect();
-    (select(rows), any::<u64>()).prop_map(|((_, name, act), seed)| Op { name, act, seed })
+/// Returns the operations of a run.
+pub(super) fn any_ops(run: u64) -> Vec<Op> {
+    let rng = &mut SmallRng::seed_from_u64(run);
+    let any = |rng: &mut SmallRng| {
+        let &(_, name, act) = OPS.choose_weighted(rng, |row| row.0).expect("weights above zero");
+        Op { name, act, seed: rng.random() }
+    };
+    (0..rng.random_range(1..MOST_OPS)).map(|_| any(rng)).collect()
 }
 
 impl Op {

@@ -4,7 +4,6 @@
 mod extremes;
 mod fuzzed;
 pub(crate) mod memory;
-mod mixed;
 mod motion;
 mod multitudes;
 mod shapes;
@@ -16,11 +15,6 @@ use crate::follower::Follower;
 use pbig_core::{Aabb, Backend, Config, ProxyFilter};
 use pbig_gpu::Coding;
 use pbig_tests::{Way, engines, gpu, may_run};
-
-/// Returns true if sizes that take minutes or gigabytes are tested, too: `PBIG_STRESS=1`.
-fn at_length() -> bool {
-    std::env::var_os("PBIG_STRESS").is_some()
-}
 
 /// Tests a set through the finder, and through updates in which its boxes change places.
 fn everywhere(name: &str, boxes: &[Aabb]) {
