@@ -2,8 +2,8 @@
 
 use pbig_core::{Aabb, Backend, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
 use pbig_gpu::Coding;
-use pbig_harness::corpus::random_case;
-use pbig_tests::{Way, corpus, difference, gpu, may_run, on_cpu, on_threads, set, shifted, strategies};
+use pbig_harness::hard::shapes;
+use pbig_tests::{Way, corpus, difference, gpu, may_run, on_threads, set, shifted, strategies};
 
 pub(crate) fn check(name: &str, boxes: &[Aabb]) {
     check_on(strategies(), name, boxes);
@@ -47,11 +47,9 @@ fn ten_thousand_random_sets_with_every_degenerate_kind() {
 }
 
 #[test]
-fn random_sets_of_every_shape() {
-    for seed in 0..100 {
-        let case = random_case(seed);
-        let strategies = on_cpu().map(|(name, config)| (name, config.into()));
-        check_on(strategies.into(), &case.name, &case.boxes);
+fn hard_shapes_on_every_strategy() {
+    for (name, recipe) in shapes() {
+        check(name, &recipe.boxes(300, 1));
     }
 }
 

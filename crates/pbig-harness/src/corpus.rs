@@ -1,10 +1,7 @@
 //! The corpus: sets of boxes for which every algorithm must find the oracle's pairs.
 
 use crate::boxes::BoxSet;
-use crate::hard::shapes;
 use pbig_core::{Aabb, Pair};
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 
 /// A set of boxes with a name, which failures report.
 #[derive(Clone, Debug)]
@@ -18,26 +15,6 @@ pub fn corpus() -> Vec<Case> {
     let mut cases = sets();
     cases.extend(by_hand().into_iter().map(|(name, boxes)| Case { name: name.into(), boxes }));
     cases
-}
-
-/// Returns the set of a seed: a generated one, a hard shape or boxes of which many are equal, mostly a few hundred and up to three
-/// thousand boxes.
-pub fn random_case(seed: u64) -> Case {
-    let (rng, hard) = (&mut StdRng::seed_from_u64(seed), shapes());
-    let n = rng.random_range(0..if seed.is_multiple_of(8) { 3000 } else { 400 });
-    let kind = rng.random_range(0..BoxSet::ALL.len() + hard.len() + 2);
-    let (name, boxes) = match (BoxSet::ALL.get(kind), kind.checked_sub(BoxSet::ALL.len())) {
-        (Some(set), _) => (set.name, set.boxes(n, seed)),
-        (None, Some(i)) if i < hard.len() => (hard[i].0, hard[i].1.boxes(n, seed)),
-        _ => ("equal boxes", alike(n, rng)),
-    };
-    Case { name: format!("{name} {n}, seed {seed}"), boxes }
-}
-
-/// Returns boxes of which each is one of a few, of any kind.
-fn alike(n: usize, rng: &mut StdRng) -> Vec<Aabb> {
-    let few = BoxSet::named("degenerate").map_or(vec![], |set| set.boxes(1 + n / 20, rng.random()));
-    (0..n).map(|_| few[rng.random_range(0..few.len())]).collect()
 }
 
 /// Returns, in words, the first difference between a list of pairs and the oracle's list.
