@@ -258,7 +258,7 @@ slowest() {
     [ "$1" = work_is_bounded ] && echo 300 || echo 60
 }
 
-# Seeds are made from the box sets and scenes; the corpus stays in fuzz/corpus. What fails lies in fuzz/artifacts: move it to
+# Seeds of the targets that read files are made from the box sets; the corpus stays in fuzz/corpus. What fails lies in fuzz/artifacts: move it to
 # fuzz/failed/TARGET, where the test suite runs it from then on.
 run_fuzz() {
     local seconds=${1:-600} target words

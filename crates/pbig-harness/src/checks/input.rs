@@ -23,10 +23,10 @@ const SPECIAL: [f32; 16] = [
 ];
 
 /// Reads from the front; nothing when the bytes are used up.
-pub(crate) struct Input<'a>(pub(crate) &'a [u8]);
+pub(super) struct Input<'a>(pub(super) &'a [u8]);
 
 impl Input<'_> {
-    pub(crate) fn byte(&mut self) -> Option<u8> {
+    pub(super) fn byte(&mut self) -> Option<u8> {
         let (first, rest) = self.0.split_first()?;
         self.0 = rest;
         Some(*first)
@@ -40,7 +40,7 @@ impl Input<'_> {
 
     /// A box, `boxes` being those before it: as six floats, on a raster, as an earlier one with a corner a few ulps
     /// elsewhere, or of special numbers.
-    pub(crate) fn aabb(&mut self, boxes: &[Aabb]) -> Option<Aabb> {
+    pub(super) fn aabb(&mut self, boxes: &[Aabb]) -> Option<Aabb> {
         let kind = self.byte()?;
         match kind & 3 {
             0 => self.bytes::<24>().map(|bytes| from_floats(bytemuck::pod_read_unaligned(&bytes))),
@@ -51,7 +51,7 @@ impl Input<'_> {
     }
 
     /// A filter of few bodies, kinds and groups, so that many pairs are allowed and many are not.
-    pub(crate) fn filter(&mut self) -> Option<ProxyFilter> {
+    pub(super) fn filter(&mut self) -> Option<ProxyFilter> {
         let [body, groups] = self.bytes::<2>()?;
         let bits = |at: u8| u32::from(groups >> at & 3);
         Some(ProxyFilter {
@@ -89,9 +89,4 @@ fn like(boxes: &[Aabb], back: u8, nudge: u8) -> Aabb {
 fn special(bytes: [u8; 3]) -> Aabb {
     let number = |i: usize| SPECIAL[usize::from(bytes[i / 2] >> (4 * (i % 2)) & 15)];
     from_floats(std::array::from_fn(number))
-}
-
-/// Returns the bytes of a box that a check reads as it is: for seeds.
-pub fn raw(aabb: &Aabb) -> Vec<u8> {
-    [&[0], bytemuck::bytes_of(aabb)].concat()
 }

@@ -5,7 +5,7 @@ mod between;
 mod bounded;
 mod engines;
 mod finder;
-pub mod input;
+mod input;
 mod readers;
 mod updates;
 mod words;
