@@ -60,8 +60,6 @@ pub struct Plot {
     pub y: String,
     /// True if both axes are logarithmic; then points have marks.
     pub is_log: bool,
-    /// True if the points of a line are joined.
-    pub is_joined: bool,
     /// The lines, at most [`MAX_LINES`].
     pub lines: Vec<Line>,
 }
@@ -80,7 +78,7 @@ impl Chart {
     pub fn log(name: &str, title: &str, [x, y]: [&str; 2], mut lines: Vec<Line>) -> Self {
         lines.retain(|line| !line.points.is_empty());
         let (title, x, y) = (title.into(), x.into(), y.into());
-        Self { name: name.into(), plots: vec![Plot { title, x, y, is_log: true, is_joined: true, lines }] }
+        Self { name: name.into(), plots: vec![Plot { title, x, y, is_log: true, lines }] }
     }
 
     /// Writes the chart. An error names the file.
@@ -109,7 +107,7 @@ impl Plot {
     /// Returns milliseconds against steps.
     pub fn steps(title: &str, lines: Vec<Line>) -> Self {
         let (x, y) = ("step".into(), "time, ms".into());
-        Self { title: title.into(), x, y, is_log: false, is_joined: true, lines }
+        Self { title: title.into(), x, y, is_log: false, lines }
     }
 
     fn lines(&self) -> impl Iterator<Item = (&Line, RGBColor)> {
@@ -144,9 +142,7 @@ impl Plot {
             let place = |&(x, v): &(f64, f64)| (x, v.max(y.zero.unwrap_or(f64::MIN)));
             let points: Vec<_> =
                 line.points.iter().filter(|point| self.has_place(point)).map(place).collect();
-            if self.is_joined {
-                chart.draw_series(LineSeries::new(points.clone(), colour.stroke_width(2)))?;
-            }
+            chart.draw_series(LineSeries::new(points.clone(), colour.stroke_width(2)))?;
             if self.is_log {
                 let mark = |at| Circle::new(at, 4, colour.filled());
                 chart.draw_series(points.into_iter().map(mark))?;
