@@ -72,18 +72,3 @@ fn a_takeover_loses_no_pair_and_leaves_none_behind() {
         }
     }
 }
-
-/// A takeover sends neither pairs that the narrow phase has nor a second end.
-#[test]
-fn a_takeover_sends_only_the_pairs_that_differ() {
-    let mut world = Scene::named("column").unwrap().build(150, 1);
-    let mut broad_phase = StockBroadPhase::default();
-    for _ in 0..60 {
-        world.step(&mut broad_phase);
-    }
-    let (held, adopted) = (world.pairs().count(), StockBroadPhase::adopt(&world));
-    assert!(held > 150 && adopted.pending.len() < held / 4, "{held} pairs, {}", adopted.pending.len());
-    world.narrow_phase = NarrowPhase::new();
-    let all = StockBroadPhase::adopt(&world).pending;
-    assert!(all.len() > 150 && all.iter().all(|event| added_pair(event).is_some()), "{}", all.len());
-}
