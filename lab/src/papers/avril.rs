@@ -5,7 +5,6 @@ use super::printed::*;
 use super::sides::{Setup, Way, effort, race};
 use crate::UNSORTED;
 use pbig_core::{Aabb, Backend, BroadPhase, Config, Finder, Pair, ProxyFilter};
-use pbig_gpu::GpuOptions;
 use pbig_harness::gpu_race;
 use pbig_harness::pair_index::pair_count;
 use pbig_harness::prelude::*;
@@ -13,11 +12,8 @@ use pbig_harness::prelude::*;
 /// The distance that cubes with edges of 1 move in a step, along each axis.
 const DISTANCE: f32 = 0.1;
 
-/// Boxes up to which a device tests every pair by default.
-const ALL_PAIRS: usize = GpuOptions::DEFAULT.all_pairs_up_to as usize;
-
 pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
-    Ok(vec![forms_on_cpu()?, brute_force_and_grid(setup)?, steps(setup)?])
+    Ok(vec![forms_on_cpu()?, brute_force_and_grid()?, steps(setup)?])
 }
 
 /// Returns the bytes that come back with a byte a pair, and with a bit (3.4).
@@ -77,27 +73,21 @@ fn forms_on_cpu() -> Result<Table, Failure> {
 
 const BRUTE: Way = Way::Finder(Config { backend: Backend::Brute, ..UNSORTED });
 
-/// Figure 4, brute force by number of objects, and table 7, with and without a grid: whole calls from nothing, all moved. On a
-/// device brute force takes up to 1024 boxes.
-fn brute_force_and_grid(setup: &Setup) -> Result<Table, Failure> {
+/// Figure 4, brute force by number of objects, and table 7, with and without a grid: whole calls from nothing, all moved.
+fn brute_force_and_grid() -> Result<Table, Failure> {
     let columns = "objects | tests | bytes up | bytes back, a bit a pair | pairs | ms, CPU: brute force | ms, CPU: our grid | \
-        ms, CPU: Avril's cells, one thread | tests/s, CPU: brute force | ms printed: without grid | \
-        ms printed: with grid | ms, GPU: with grid | ms, GPU: without grid";
+        ms, CPU: Avril's cells, one thread | tests/s, CPU: brute force | ms printed: without grid | ms printed: with grid";
     let mut table = Table::new("Avril figure 4 and table 7: brute force, with and without a grid", columns);
-    let on_device = [0, ALL_PAIRS as u32]
-        .map(|all_pairs_up_to| Way::Gpu(GpuOptions { all_pairs_up_to, ..GpuOptions::DEFAULT }));
     for n in [100usize, 500, 1000, 2500, 5000, 10_000] {
         let (boxes, tests) = (cubes(n, 1.0, 1.0, 1), pair_count(n as u64));
-        let gpu = setup.run(&on_device[..1 + usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
         let cpu = race(&[BRUTE, Way::Finder(OUR_GRID), Way::Avril], None, boxes, DISTANCE, effort(n))?;
         let bytes = [24 * n, output_bytes(n as u64)[1] as usize];
         let ms = cpu.iter().map(|call| call.median);
         let tests_a_second = tests as f64 / cpu[0].median * 1e3;
         let printed = AVRIL_7.iter().find(|row| row.0 == n);
         let printed = [printed.map(|row| row.1), printed.map(|row| row.2)];
-        let on_device = gpu.iter().map(|call| call.ms);
         let counts = cells![n, tests, ..bytes, cpu[0].report.pairs];
-        table.row(cells![..counts, ..ms, tests_a_second, ..printed, ..on_device]);
+        table.row(cells![..counts, ..ms, tests_a_second, ..printed]);
     }
     Ok(table)
 }
