@@ -125,14 +125,12 @@ step_wasm() {
     step scripts/extra.sh --no-setup wasm
 }
 
-# The commands that the documents show, at a size that takes seconds.
+# The examples that no document runs (see step_docs), at a size that takes seconds.
 step_examples() {
     step cargo run --release --example falling_objects -- --bodies 500 --steps 60
-    for example in drop_in existing_app headless_test debug_render boxes_to_pairs boxes_events cloth other_device; do
+    for example in existing_app debug_render boxes_events cloth other_device; do
         step cargo run --release --example "$example"
     done
-    step cargo run --release --bin pbig -- pairs examples/boxes.csv
-    step cargo run --release --bin pbig -- replay examples/frames.npy
     step cargo run --release --bin pbig -- simulate --scene pile --check --backend gpu --bodies 1500 --steps 20
     has_gpu || { left_out "there is no GPU adapter for own_device and resident" && return; }
     step cargo run --release --example own_device
