@@ -44,13 +44,13 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 fn main() {
     for scene in Scene::ALL {
-        let (mut world, mut broad_phase) = (world::World::of(&scene.plan($bodies, 1)), BroadPhaseBvh::new());
+        let mut world = build::world_of(&scene.plan($bodies, 1), BroadPhaseBvh::new());
         let mut hash = DefaultHasher::new();
         for step in 0..$steps {
-            world.step(&mut broad_phase);
-            world.pose_bits().hash(&mut hash);
+            world.step();
+            world::pose_bits(&world).hash(&mut hash);
             if step % 20 == 0 {
-                postcard::to_stdvec(&broad_phase).expect("bytes").hash(&mut hash);
+                postcard::to_stdvec(&world.broad_phase).expect("bytes").hash(&mut hash);
             }
         }
         println!("{} {:016x}", scene.name, hash.finish());

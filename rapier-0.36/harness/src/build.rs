@@ -1,29 +1,23 @@
 //! Builds the world of a plan on rapier 0.36.
 
 use crate::dimension::{angular, cuboid, cylinder, heightfield, joint, keeping_z, kilogramme, round_cuboid};
-use crate::world::{World, pose, real, to_vector, turned};
+use crate::world::{pose, real, to_vector, turned};
 use pbig_scenes::plan::{Body, BodyKind, Collider, Joint, Plan, Shape};
 use rapier::prelude::*;
 
-impl World {
-    /// Builds the world of a plan.
-    pub fn of(plan: &Plan) -> Self {
-        let mut world = Self::default();
-        world.gravity = plan.gravity;
-        let bodies: Vec<_> = plan.bodies.iter().map(|body| world.bodies.insert(rigid_body(body))).collect();
-        for part in &plan.colliders {
-            let built = collider(part);
-            match part.body {
-                Some(body) => _ = world.colliders.insert_with_parent(built, bodies[body], &mut world.bodies),
-                None => _ = world.colliders.insert(built),
-            }
-        }
-        for part in &plan.joints {
-            let [one, other] = part.bodies.map(|body| bodies[body]);
-            world.impulse_joints.insert(one, other, anchored(part), true);
-        }
-        world
+/// Builds the world of a plan around a broad phase.
+pub fn world_of(plan: &Plan, broad_phase: BroadPhaseBvh) -> PhysicsWorld {
+    let mut world = crate::world::with(broad_phase);
+    world.gravity = to_vector(plan.gravity);
+    let bodies: Vec<_> = plan.bodies.iter().map(|body| world.insert_body(rigid_body(body))).collect();
+    for part in &plan.colliders {
+        world.insert_collider(collider(part), part.body.map(|body| bodies[body]));
     }
+    for part in &plan.joints {
+        let [one, other] = part.bodies.map(|body| bodies[body]);
+        world.impulse_joints.insert(one, other, anchored(part), true);
+    }
+    world
 }
 
 fn rigid_body(body: &Body) -> RigidBodyBuilder {

@@ -1,6 +1,6 @@
 //! The scene queries of each frame, put to rapier.
 
-use crate::world::{World, from_vector, pose, real, to_vector};
+use crate::world::{from_vector, pose, real, to_vector};
 use glam::Vec3;
 use pbig_scenes::frames::{
     AREA_RADIUS_METRES, CAPSULE_HALF_HEIGHT_METRES, CAPSULE_RADIUS_METRES, CAST_RADIUS_METRES, Extent,
@@ -21,19 +21,15 @@ pub struct FrameQueries {
 impl FrameQueries {
     /// Begins at the first frame, in a world that has not made a step. Returns nothing for a kind without queries: a frame
     /// must not touch the broad phase then, because its index may wait for a first query.
-    pub fn new(kind: FrameKind, world: &World) -> Option<Self> {
+    pub fn new(kind: FrameKind, world: &PhysicsWorld) -> Option<Self> {
         let extent = extent(world);
         let queries = Self { kind, extent, frame: 0, character: extent.character_start() };
         (kind != FrameKind::None).then_some(queries)
     }
 
     /// Asks the queries of the next frame, and returns the number of hits.
-    pub fn ask(&mut self, world: &World, broad_phase: &BroadPhaseBvh) -> u64 {
-        let World { bodies, colliders, narrow_phase, .. } = world;
-        let filter = QueryFilter::default();
-        let queries =
-            broad_phase.as_query_pipeline(narrow_phase.query_dispatcher(), bodies, colliders, filter);
-        let hits = self.hits(&queries);
+    pub fn ask(&mut self, world: &PhysicsWorld) -> u64 {
+        let hits = self.hits(&world.query_pipeline());
         self.frame += 1;
         hits
     }
@@ -63,7 +59,7 @@ impl FrameQueries {
 }
 
 /// Returns the AABB around the colliders of all bodies that can move.
-fn extent(world: &World) -> Extent {
+fn extent(world: &PhysicsWorld) -> Extent {
     let can_move = |collider: &Collider| collider.parent().is_some_and(|body| !world.bodies[body].is_fixed());
     let moving = world.colliders.iter().filter(|(_, collider)| can_move(collider));
     Extent::around(moving.map(|(_, collider)| {

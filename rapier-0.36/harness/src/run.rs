@@ -1,19 +1,16 @@
 //! Runs a scene step by step and measures the broad phase, the whole step, and the scene queries after it.
 
+use crate::build::world_of;
 use crate::queries::FrameQueries;
-use crate::world::World;
 use pbig_scenes::frames::FrameKind;
 use pbig_scenes::scenes::Scene;
 pub use pbig_scenes::times::{StepTime, Summary};
-use rapier::prelude::BroadPhaseBvh;
+use rapier::prelude::{BroadPhaseBvh, PhysicsWorld};
 use std::time::Instant;
 
 /// A scene being run with one broad phase.
 pub struct Run {
-    /// The world.
-    pub world: World,
-    /// The broad phase.
-    pub broad_phase: BroadPhaseBvh,
+    pub world: PhysicsWorld,
     /// One for each step so far.
     pub times: Vec<StepTime>,
     /// Hits of all queries so far.
@@ -22,10 +19,9 @@ pub struct Run {
 }
 
 impl Run {
-    /// Builds the scene.
     pub fn new(scene: Scene, bodies: usize, seed: u64, broad_phase: BroadPhaseBvh) -> Self {
-        let (world, times) = (World::of(&scene.plan(bodies, seed)), Vec::new());
-        Self { world, broad_phase, times, hits: 0, queries: None }
+        let world = world_of(&scene.plan(bodies, seed), broad_phase);
+        Self { world, times: Vec::new(), hits: 0, queries: None }
     }
 
     /// Adds scene queries to each frame.
@@ -36,9 +32,9 @@ impl Run {
     /// One frame, measured: a step, then the scene queries if there are any.
     pub fn step(&mut self) {
         let clock = Instant::now();
-        self.world.step(&mut self.broad_phase);
+        self.world.step();
         let step = clock.elapsed().as_secs_f64() * 1e3;
-        let counters = &self.world.pipeline.counters.cd;
+        let counters = &self.world.physics_pipeline.counters.cd;
         let broad_phase = counters.broad_phase_time.time_ms() + counters.final_broad_phase_time.time_ms();
         let queries = self.ask();
         self.times.push(StepTime { broad_phase, step, queries, frame: step + queries });
@@ -48,7 +44,7 @@ impl Run {
     fn ask(&mut self) -> f64 {
         let Some(queries) = &mut self.queries else { return 0.0 };
         let clock = Instant::now();
-        self.hits += queries.ask(&self.world, &self.broad_phase);
+        self.hits += queries.ask(&self.world);
         clock.elapsed().as_secs_f64() * 1e3
     }
 

@@ -14,12 +14,10 @@ pub fn rotation(turn: Quat) -> Rotation {
     Rotation::from_xyzw(x, y, z, w)
 }
 
-/// Returns the numbers of a rotation.
 pub fn parts(turn: &Rotation) -> [Real; 4] {
     [turn.x, turn.y, turn.z, turn.w]
 }
 
-/// Returns an angular velocity.
 pub fn angular(velocity: Vec3) -> AngVector {
     to_vector(velocity)
 }
@@ -45,7 +43,7 @@ pub(crate) fn heightfield(side: usize, heights: &[f32], scale: Vec3) -> SharedSh
 }
 
 /// Returns a cube that bends, by half its edge.
-pub(crate) fn soft_cube(at: Vec3, half: f32) -> SoftBodyBuilder {
+pub fn soft_cube(at: Vec3, half: f32) -> SoftBodyBuilder {
     SoftBodyBuilder::cuboid(to_vector(at), Vector::splat(real(half)), 3, 3, 3)
 }
 
@@ -57,7 +55,6 @@ pub(crate) fn keeping_z(body: RigidBodyBuilder) -> RigidBodyBuilder {
     body.enabled_translations(true, true, false)
 }
 
-/// Returns a joint.
 pub fn joint(kind: JointKind) -> GenericJoint {
     match kind {
         JointKind::Socket(most) => {

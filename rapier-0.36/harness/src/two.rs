@@ -11,12 +11,10 @@ pub fn rotation(turn: Quat) -> Rotation {
     Rotation::from_angle(real(2.0 * turn.z.atan2(turn.w)))
 }
 
-/// Returns the numbers of a rotation.
 pub fn parts(turn: &Rotation) -> [Real; 2] {
     [turn.re, turn.im]
 }
 
-/// Returns an angular velocity.
 pub fn angular(velocity: Vec3) -> AngVector {
     real(velocity.z)
 }
@@ -41,7 +39,7 @@ pub(crate) fn heightfield(side: usize, heights: &[f32], scale: Vec3) -> SharedSh
 }
 
 /// Returns a square that bends, by half its edge.
-pub(crate) fn soft_cube(at: Vec3, half: f32) -> SoftBodyBuilder {
+pub fn soft_cube(at: Vec3, half: f32) -> SoftBodyBuilder {
     SoftBodyBuilder::grid(to_vector(at), Vector::splat(real(half)), 3, 3)
 }
 

@@ -2,30 +2,30 @@
 #![cfg(feature = "f64")]
 
 use glam::Vec3;
-use pbig_harness_036::world::{World, to_vector};
+use pbig_harness_036::world::{ground, to_vector};
 use rapier::prelude::*;
 use rapier_pbig::PbigFinder;
 use rapier_pbig::shadow::{Shadow, checker};
 
 /// Returns the number of pairs after the first step of a heap at a distance along x.
 fn pairs(distance: f64) -> usize {
-    let (mut world, mut broad_phase) = (World::default(), BroadPhaseBvh::new());
+    let mut world = PhysicsWorld::new();
     let finder = PbigFinder::default().with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);
-    rapier_pbig::install_finder(&mut broad_phase, finder);
-    world.colliders.insert(World::ground());
+    rapier_pbig::install_finder(&mut world.broad_phase, finder);
+    world.colliders.insert(ground());
     for i in 0..400u16 {
         let [x, y] = [i % 20, i / 20].map(|k| 0.97 * f32::from(k));
         let at = to_vector(Vec3::new(x, y + 0.5, 0.0)) + Vector::X * distance;
-        world.add(RigidBodyBuilder::dynamic().translation(at), ColliderBuilder::ball(0.5));
+        world.insert(RigidBodyBuilder::dynamic().translation(at), ColliderBuilder::ball(0.5));
     }
     let mut count = 0;
     for step in 0..40 {
-        world.step(&mut broad_phase);
+        world.step();
         if step == 0 {
-            count = rapier_pbig::finder(&broad_phase).expect("it is installed").pair_count();
+            count = rapier_pbig::finder(&world.broad_phase).expect("it is installed").pair_count();
         }
     }
-    let checker = checker(&broad_phase).expect("it was added");
+    let checker = checker(&world.broad_phase).expect("it was added");
     assert!(checker.differences.is_empty(), "at {distance}: {}", checker.differences[0]);
     assert!(checker.compared > 30 && checker.oracle_pairs > 10_000, "{}", checker.oracle_pairs);
     count

@@ -2,15 +2,15 @@
 
 use glam::Vec3;
 use pbig_harness_036::dimension::cuboid;
-use pbig_harness_036::world::{World, to_vector};
+use pbig_harness_036::world::{dynamic, from_bytes, to_bytes, to_vector, with};
 use pbig_scenes::pair_order::{self, Change, Told, Zone};
 use rand::RngExt;
 use rand::rngs::StdRng;
 use rapier::prelude::*;
+use std::sync::mpsc::channel;
 
 struct InRapier {
-    world: World,
-    broad_phase: BroadPhaseBvh,
+    world: PhysicsWorld,
     balls: Vec<RigidBodyHandle>,
 }
 
@@ -20,18 +20,18 @@ fn listening(collider: ColliderBuilder) -> ColliderBuilder {
 
 impl Zone for InRapier {
     fn new() -> Self {
-        let mut world = World::default();
+        let mut world = with(rapier_pbig::broad_phase());
         world.colliders.insert(listening(ColliderBuilder::new(cuboid(Vec3::splat(2.0)))).sensor(true));
-        Self { world, broad_phase: rapier_pbig::broad_phase(), balls: Vec::new() }
+        Self { world, balls: Vec::new() }
     }
 
     fn add_ball(&mut self, at: Vec3, is_sensor: bool) {
-        let body = World::dynamic(at).gravity_scale(0.0);
-        self.balls.push(self.world.add(body, listening(ColliderBuilder::ball(0.4)).sensor(is_sensor)));
+        let (body, ball) = (dynamic(at).gravity_scale(0.0), listening(ColliderBuilder::ball(0.4)));
+        self.balls.push(self.world.insert(body, ball.sensor(is_sensor)).0);
     }
 
     fn change(&mut self, ball: usize, change: Change) {
-        let World { bodies, colliders, .. } = &mut self.world;
+        let PhysicsWorld { bodies, colliders, .. } = &mut self.world;
         let body = &mut bodies[self.balls[ball]];
         let collider = &mut colliders[body.colliders()[0]];
         match change {
@@ -45,18 +45,17 @@ impl Zone for InRapier {
 
     /// Changes who finds the pairs: nobody, by a save and a restore, with or without pbig afterwards, or at once.
     fn hand_over(&mut self, rng: &mut StdRng) {
-        let Self { world, broad_phase, .. } = self;
+        let world = &mut self.world;
         match rng.random_range(0..5) {
-            0 => rapier_pbig::uninstall(broad_phase),
-            1 => rapier_pbig::install(broad_phase),
+            0 => rapier_pbig::uninstall(&mut world.broad_phase),
+            1 => rapier_pbig::install(&mut world.broad_phase),
             kind @ (2 | 3) => {
-                let bytes = world.to_bytes(broad_phase);
-                (*world, *broad_phase) = World::from_bytes(&bytes).expect("the bytes of a world");
+                *world = from_bytes(&to_bytes(world));
                 if kind == 3 {
-                    rapier_pbig::install(broad_phase);
+                    rapier_pbig::install(&mut world.broad_phase);
                 }
             }
-            _ => *broad_phase = broad_phase.clone(),
+            _ => world.broad_phase = world.broad_phase.clone(),
         }
     }
 
@@ -67,7 +66,9 @@ impl Zone for InRapier {
             CollisionEvent::Started(one, other, _) => (true, parts(one, other)),
             CollisionEvent::Stopped(one, other, _) => (false, parts(one, other)),
         };
-        self.world.step_with_events(&mut self.broad_phase).into_iter().map(told).collect()
+        let (send, received) = channel();
+        self.world.step_with_events(&(), &ChannelEventCollector::new(send, channel().0, channel().0));
+        received.try_iter().map(told).collect()
     }
 }
 

@@ -4,30 +4,29 @@
 use glam::Vec3;
 use pbig_harness_036::queries::FrameQueries;
 use pbig_harness_036::run::Run;
-use pbig_harness_036::world::World;
+use pbig_harness_036::world::{dynamic, ground, with};
 use pbig_scenes::frames::FrameKind;
 use pbig_scenes::scenes::Scene;
-use rapier::prelude::{BroadPhaseBvh, ColliderBuilder};
+use rapier::prelude::{BroadPhaseBvh, ColliderBuilder, PhysicsWorld, Vector};
 
 /// Returns balls that hang still above a ground.
-fn still_world() -> World {
-    let mut world = World::default();
-    world.gravity = Vec3::ZERO;
-    world.colliders.insert(World::ground());
+fn still_world(broad_phase: BroadPhaseBvh) -> PhysicsWorld {
+    let mut world = PhysicsWorld { gravity: Vector::ZERO, ..with(broad_phase) };
+    world.colliders.insert(ground());
     for i in 0..216 {
         let place = Vec3::new((i % 6) as f32, (i / 36) as f32, (i / 6 % 6) as f32);
-        world.add(World::dynamic(2.0 * place + Vec3::Y), ColliderBuilder::ball(0.5));
+        world.insert(dynamic(2.0 * place + Vec3::Y), ColliderBuilder::ball(0.5));
     }
     world
 }
 
 /// Returns the hits of some frames.
-fn hits(kind: FrameKind, mut broad_phase: BroadPhaseBvh) -> u64 {
-    let mut world = still_world();
+fn hits(kind: FrameKind, broad_phase: BroadPhaseBvh) -> u64 {
+    let mut world = still_world(broad_phase);
     let mut queries = FrameQueries::new(kind, &world).expect("a kind with queries");
     let frames = (0..40).map(|_| {
-        world.step(&mut broad_phase);
-        queries.ask(&world, &broad_phase)
+        world.step();
+        queries.ask(&world)
     });
     frames.sum()
 }

@@ -1,7 +1,7 @@
 //! Asks pbig's index and a tree of the same boxes, searched by rapier's own code, the same questions.
 
 use glam::Vec3;
-use pbig_harness_036::world::{World, pose, to_vector};
+use pbig_harness_036::world::{pose, to_vector};
 use rand::RngExt;
 use rand::rngs::StdRng;
 use rapier::math::Real;
@@ -69,13 +69,12 @@ impl Question {
 }
 
 /// Asks both some questions. Returns how many rays hit.
-pub(crate) fn compare(world: &World, broad_phase: &BroadPhaseBvh, rng: &mut StdRng) -> u64 {
+pub(crate) fn compare(world: &PhysicsWorld, rng: &mut StdRng) -> u64 {
     let mut hits = 0;
     for filter in
         [QueryFilter::default(), QueryFilter::only_dynamic(), QueryFilter::default().exclude_sensors()]
     {
-        let (dispatcher, question) = (world.narrow_phase.query_dispatcher(), Question::new(rng));
-        let of_index = broad_phase.as_query_pipeline(dispatcher, &world.bodies, &world.colliders, filter);
+        let (question, of_index) = (Question::new(rng), world.query_pipeline_with_filter(filter));
         // Before its first update a finder knows nothing, and rapier's own tree answers.
         let Some(finder) = of_index.bvh.finder() else { return hits };
         // As code that was written for the unpatched rapier reads and sets the field.

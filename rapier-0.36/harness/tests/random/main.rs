@@ -6,8 +6,9 @@ mod ask;
 mod planted;
 
 use glam::Vec3;
-use pbig_harness_036::dimension::{cuboid, joint};
-use pbig_harness_036::world::{World, groups_that_meet, real, to_vector, turned};
+use pbig_harness_036::build::world_of;
+use pbig_harness_036::dimension::{cuboid, joint, soft_cube};
+use pbig_harness_036::world::{from_bytes, ground, groups_that_meet, real, to_bytes, to_vector, turned};
 use pbig_scenes::plan::JointKind;
 use pbig_scenes::scenes::Scene;
 use planted::{BUSY, Plant, Planted};
@@ -26,8 +27,7 @@ const OPS: usize = 60;
 
 /// A world under random operations.
 struct Player {
-    world: World,
-    broad_phase: BroadPhaseBvh,
+    world: PhysicsWorld,
     rng: StdRng,
     is_adaptive: bool,
     plant: Plant,
@@ -56,21 +56,20 @@ fn subject(plant: Plant) -> Subject {
     Shadowed::new(planted, PbigConfig::DEFAULT.margin).with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle)
 }
 
-fn subject_in(broad_phase: &BroadPhaseBvh) -> &Subject {
-    let finder = broad_phase.pair_finder().expect("it is installed") as &dyn Any;
+fn subject_in(world: &PhysicsWorld) -> &Subject {
+    let finder = world.broad_phase.pair_finder().expect("it is installed") as &dyn Any;
     finder.downcast_ref().expect("it is ours")
 }
 
 impl Player {
     fn new(seed: u64, plant: Plant) -> Self {
-        let mut broad_phase = BroadPhaseBvh::new();
-        rapier_pbig::install_finder(&mut broad_phase, subject(plant));
-        let (mut world, mut rng) = (World::default(), StdRng::seed_from_u64(seed));
-        world.colliders.insert(World::ground());
-        world.params.max_ccd_substeps = rng.random_range(0..4);
+        let (mut world, mut rng) = (PhysicsWorld::new(), StdRng::seed_from_u64(seed));
+        rapier_pbig::install_finder(&mut world.broad_phase, subject(plant));
+        world.colliders.insert(ground());
+        world.integration_parameters.max_ccd_substeps = rng.random_range(0..4);
         let is_adaptive = rng.random_range(0..4) == 0;
-        broad_phase.adaptive_change_detection_margin = is_adaptive;
-        Self { world, broad_phase, rng, is_adaptive, plant }
+        world.broad_phase.adaptive_change_detection_margin = is_adaptive;
+        Self { world, rng, is_adaptive, plant }
     }
 
     fn place(&mut self) -> Vec3 {
@@ -134,8 +133,8 @@ impl Player {
             .is_some_and(|parent| self.world.bodies.get(parent).is_some_and(RigidBody::is_soft_frame));
         match op {
             0..5 => self.add(),
-            5 => self.world.remove(body),
-            6 if !is_soft => self.world.remove_collider(collider),
+            5 => _ = self.world.remove_body(body),
+            6 if !is_soft => _ = self.world.remove_collider(collider),
             7 => self.world.bodies[body].set_enabled(false),
             8 => self.world.bodies[body].set_enabled(true),
             9 if !is_soft => self.world.colliders[collider].set_enabled(false),
@@ -145,7 +144,7 @@ impl Player {
                 self.world.bodies[body].set_translation(at, true);
             }
             12 if !is_soft => {
-                let World { colliders, bodies, .. } = &mut self.world;
+                let PhysicsWorld { colliders, bodies, .. } = &mut self.world;
                 colliders.set_parent(collider, Some(body), bodies);
             }
             // Rapier panics at a joint between bodies of which none is dynamic.
@@ -164,7 +163,7 @@ impl Player {
             17 => self.restore(tally),
             18 if self.rng.random_range(0..8) == 0 => {
                 let at = self.place();
-                self.world.add_soft(at, 0.5);
+                self.world.insert_soft_body(soft_cube(at, 0.5).particle_mass(0.2));
                 tally.soft += 1;
             }
             19 => {
@@ -177,7 +176,7 @@ impl Player {
                 let is_sensor = self.rng.random_range(0..2) == 0;
                 self.world.colliders[collider].set_sensor(is_sensor);
             }
-            22 => self.world.remove_body_alone(body),
+            22 => _ = self.world.remove_body_with_colliders(body, false),
             23 => self.tell_aabb(collider),
             24 => self.replace_by_clone(),
             25 => self.change_margin(),
@@ -195,7 +194,7 @@ impl Player {
 
     fn add(&mut self) {
         let (body, collider) = (self.body(), self.collider());
-        self.world.add(body, collider);
+        self.world.insert(body, collider);
     }
 
     fn join(&mut self, body: RigidBodyHandle) {
@@ -209,14 +208,10 @@ impl Player {
 
     /// A query between steps finds each collider that the finder knows by its own AABB.
     fn query(&mut self, tally: &mut Tally) {
-        let World { narrow_phase, bodies, colliders, .. } = &self.world;
-        let (subject, filter) = (subject_in(&self.broad_phase), QueryFilter::default());
-        let queries =
-            self.broad_phase.as_query_pipeline(narrow_phase.query_dispatcher(), bodies, colliders, filter);
-        let (boxes, _) = subject.state();
+        let (queries, (boxes, _)) = (self.world.query_pipeline(), subject_in(&self.world).state());
         for (handle, aabb) in boxes {
             let found = queries.intersect_aabb_conservative(aabb).any(|(found, _)| found == handle);
-            assert!(found || !colliders.contains(handle), "{handle:?} at {aabb:?}");
+            assert!(found || !self.world.colliders.contains(handle), "{handle:?} at {aabb:?}");
             tally.queries += 1;
         }
     }
@@ -225,38 +220,34 @@ impl Player {
     fn ask(&mut self, tally: &mut Tally) {
         if self.plant == Plant::Nothing {
             BUSY.set(true);
-            tally.hits += ask::compare(&self.world, &self.broad_phase, &mut self.rng);
+            tally.hits += ask::compare(&self.world, &mut self.rng);
             BUSY.set(false);
         }
     }
 
     /// Saves and restores the world. Half the time its tree goes on for a step before pbig takes over again.
     fn restore(&mut self, tally: &mut Tally) {
-        let bytes = self.world.to_bytes(&self.broad_phase);
-        let (world, broad_phase) = World::from_bytes(&bytes).expect("these are the bytes of a world");
-        (self.world, self.broad_phase) = (world, broad_phase);
-        self.broad_phase.adaptive_change_detection_margin = self.is_adaptive;
+        self.world = from_bytes(&to_bytes(&self.world));
+        self.world.broad_phase.adaptive_change_detection_margin = self.is_adaptive;
         if self.rng.random_range(0..2) == 0 {
-            self.world.step(&mut self.broad_phase);
+            self.world.step();
         }
-        rapier_pbig::install_finder(&mut self.broad_phase, subject(self.plant));
+        rapier_pbig::install_finder(&mut self.world.broad_phase, subject(self.plant));
         tally.restores += 1;
     }
 
     /// An app may tell the AABB of a collider before the step; a query must find it there.
     fn tell_aabb(&mut self, collider: ColliderHandle) {
         self.world.colliders[collider].set_enabled(true);
-        let one = &self.world.colliders[collider];
-        let is_enabled = one.is_enabled();
-        let aabb = one.compute_broad_phase_aabb(&self.world.params, &self.world.bodies);
-        if !(is_enabled && aabb.mins.is_finite() && aabb.maxs.is_finite()) {
+        let PhysicsWorld { integration_parameters: params, bodies, colliders, broad_phase, .. } =
+            &mut self.world;
+        let one = &colliders[collider];
+        let aabb = one.compute_broad_phase_aabb(params, bodies);
+        if !(one.is_enabled() && aabb.mins.is_finite() && aabb.maxs.is_finite()) {
             return;
         }
-        self.broad_phase.set_aabb(&self.world.params, collider, aabb);
-        let World { narrow_phase, bodies, colliders, .. } = &self.world;
-        let dispatcher = narrow_phase.query_dispatcher();
-        let queries =
-            self.broad_phase.as_query_pipeline(dispatcher, bodies, colliders, QueryFilter::default());
+        broad_phase.set_aabb(params, collider, aabb);
+        let queries = self.world.query_pipeline();
         assert!(
             queries.intersect_aabb_conservative(aabb).any(|(found, _)| found == collider),
             "{collider:?}"
@@ -264,24 +255,24 @@ impl Player {
     }
 
     fn replace_by_clone(&mut self) {
-        self.broad_phase = self.broad_phase.clone();
+        self.world.broad_phase = self.world.broad_phase.clone();
     }
 
     /// Changes what the margin depends on. Margins only grow: with a smaller one, older boxes would have pairs that it excludes.
     fn change_margin(&mut self) {
         if self.rng.random_range(0..2) == 0 {
             self.is_adaptive = true;
-            self.broad_phase.adaptive_change_detection_margin = true;
+            self.world.broad_phase.adaptive_change_detection_margin = true;
         } else {
-            self.world.params.length_unit *= 1.25;
+            self.world.integration_parameters.length_unit *= 1.25;
         }
     }
 
     /// Rapier's tree finds the pairs of a step, then pbig again.
     fn go_on_with_the_tree(&mut self) {
-        rapier_pbig::uninstall(&mut self.broad_phase);
-        self.world.step(&mut self.broad_phase);
-        rapier_pbig::install_finder(&mut self.broad_phase, subject(self.plant));
+        rapier_pbig::uninstall(&mut self.world.broad_phase);
+        self.world.step();
+        rapier_pbig::install_finder(&mut self.world.broad_phase, subject(self.plant));
     }
 
     /// Gives a body a velocity of NaN. Rapier disables such a body.
@@ -292,7 +283,7 @@ impl Player {
     }
 
     fn check(&self, seed: u64) -> Result<(), String> {
-        let subject = subject_in(&self.broad_phase);
+        let subject = subject_in(&self.world);
         match (&subject.checker.differences[..], subject.inner.finder.last_error()) {
             ([], None) => Ok(()),
             ([first, ..], _) => Err(format!("seed {seed}: {first}")),
@@ -307,7 +298,7 @@ fn run(seed: u64, plant: Plant, tally: &mut Tally) -> Result<(), String> {
         let mut play = || {
             player.play(tally);
             if player.rng.random_range(0..2) == 0 {
-                player.world.step(&mut player.broad_phase);
+                player.world.step();
                 tally.steps += 1;
                 player.ask(tally);
             }
@@ -321,7 +312,7 @@ fn run(seed: u64, plant: Plant, tally: &mut Tally) -> Result<(), String> {
         }
         player.check(seed)?;
     }
-    let checker = &subject_in(&player.broad_phase).checker;
+    let checker = &subject_in(&player.world).checker;
     tally.compared += checker.compared as u64;
     tally.oracle_pairs += checker.oracle_pairs;
     tally.contacts += player.world.narrow_phase.contact_pairs().count() as u64;
@@ -357,11 +348,11 @@ fn planted_faults_are_noticed() {
 fn every_scene_answers_in_each_frame_as_rapiers_tree_does() {
     let mut hits = 0;
     for scene in Scene::ALL {
-        let (mut world, mut broad_phase) = (World::of(&scene.plan(250, 1)), rapier_pbig::broad_phase());
+        let mut world = world_of(&scene.plan(250, 1), rapier_pbig::broad_phase());
         let mut rng = StdRng::seed_from_u64(1);
         for _ in 0..60 {
-            world.step(&mut broad_phase);
-            hits += ask::compare(&world, &broad_phase, &mut rng);
+            world.step();
+            hits += ask::compare(&world, &mut rng);
         }
     }
     assert!(hits > 100, "{hits}");
