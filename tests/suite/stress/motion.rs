@@ -80,9 +80,10 @@ fn fall(config: Config, steps: usize, acceleration: f32) -> (Cost, f32) {
             world.update_unchecked();
         }
         let report = world.broad_phase.report();
-        // In a slow fall few boxes leave their margins in a step, and are looked up.
-        let is_small = matches!(report.plan.algorithm, Algorithm::Brute | Algorithm::LookUp);
-        assert_eq!(is_small, config.engine.is_none(), "step {step}");
+        // In a slow fall few boxes leave their margins in a step, or none does.
+        let algorithm = report.plan.algorithm;
+        let is_small = matches!(algorithm, Algorithm::Brute | Algorithm::LookUp);
+        assert!(algorithm == Algorithm::Nothing || is_small == config.engine.is_none(), "step {step}");
         cost.note(report.checks.made, step, steps);
         let held = memory::held();
         if step < steps / 4 {
