@@ -70,7 +70,7 @@ fn cell(row: &BTreeMap<String, String>, columns: &str) -> Result<String, String>
 
 /// Returns a document with its tables written anew, and their names. `text` returns the table of a name.
 fn written(document: &str, text: impl Fn(&str) -> Result<String, String>) -> (String, Vec<String>) {
-    let pattern = Regex::new(r"(?ms)^<!-- table: (\S+) -->\n.*?^<!-- end -->$").expect("a pattern");
+    let pattern = Regex::new(r"(?ms)^<!-- table: ([^ ]+) -->\n.*?^<!-- end -->$").expect("a pattern");
     let mut names = vec![];
     let new = pattern.replace_all(document, |found: &regex::Captures| {
         names.push(found[1].to_owned());
