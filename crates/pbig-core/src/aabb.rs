@@ -1,7 +1,18 @@
 //! The axis-aligned bounding box (AABB), the only geometry that pbig knows.
 
-use crate::simd::one_box;
+#[cfg(any(test, not(target_arch = "x86_64")))]
+pub(crate) mod axes;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod sse;
+
+#[cfg(not(target_arch = "x86_64"))]
+pub(crate) use axes as one_box;
 use bytemuck::{Pod, Zeroable};
+#[cfg(target_arch = "x86_64")]
+pub(crate) use sse as one_box;
+
+/// Least and greatest coordinates of some boxes, and greatest extents. Each has an axis a lane; the fourth lane holds anything.
+pub(crate) type Extremes = [[f32; 4]; 3];
 
 /// A closed axis-aligned box in f32, in the caller's length unit.
 ///

@@ -1,9 +1,9 @@
 //! The world: what is kept of each box by id, and which boxes have changed since the last update.
 
 use super::tree::Tree;
+use crate::aabb::one_box;
 use crate::id_set::IdSet;
 use crate::parallel::{run_parts, split_into, threads_for};
-use crate::simd::one_box;
 use crate::{Aabb, ProxyFilter};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 

@@ -1,7 +1,7 @@
 //! A box as the search reads it: half a cache line.
 
 use crate::Aabb;
-use crate::simd::one_box;
+use crate::aabb::one_box;
 
 /// A box with its id and the key of its cell.
 #[repr(C, align(32))]

@@ -1,9 +1,9 @@
 //! Primitives of AVX2, which all x86-64 processors of the last ten years have.
 
 use super::codes::{MAX_STEP, MIN_STEP, Steps};
-use super::sse::corners;
 use super::{BLOCK, Eight, Simd};
 use crate::Aabb;
+use crate::aabb::sse::corners;
 use std::arch::x86_64::*;
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -306,4 +306,11 @@ unsafe fn halves(row: __m256i) -> (__m128, __m128) {
         let row = _mm256_castsi256_ps(row);
         (_mm256_castps256_ps128(row), _mm256_extractf128_ps::<1>(row))
     }
+}
+
+/// Starts to bring the cache line at `address` into the cache.
+#[inline(always)]
+pub(crate) fn prefetch<T>(address: *const T) {
+    // SAFETY: a prefetch reads nothing that could fault.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
 }

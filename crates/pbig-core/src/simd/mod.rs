@@ -4,28 +4,21 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-#[cfg(any(test, not(target_arch = "x86_64")))]
-pub(crate) mod axes;
 mod codes;
 mod instructions;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod portable;
-#[cfg(target_arch = "x86_64")]
-pub(crate) mod sse;
 
 #[cfg(target_arch = "x86_64")]
-pub(crate) use self::sse as one_box;
-#[cfg(target_arch = "x86_64")]
-pub(crate) use avx2::Avx2;
-#[cfg(not(target_arch = "x86_64"))]
-pub(crate) use axes as one_box;
+pub(crate) use avx2::{Avx2, prefetch};
 pub(crate) use codes::{Steps, TOMBSTONE, query_of};
 pub(crate) use instructions::Simd;
 #[cfg(target_arch = "aarch64")]
 use neon::Neon;
-pub(crate) use one_box::prefetch;
 pub(crate) use portable::Portable;
+#[cfg(not(target_arch = "x86_64"))]
+pub(crate) use portable::prefetch;
 
 /// Codes tested together: a cache line of them.
 pub(crate) const BLOCK: usize = 8;
@@ -35,9 +28,6 @@ pub(crate) type EightBoxes = [[f32; BLOCK]; 6];
 
 /// Eight ids or places.
 pub(crate) type Eight = [u32; BLOCK];
-
-/// Least and greatest coordinates of some boxes, and greatest extents. Each has an axis a lane; the fourth lane holds anything.
-pub(crate) type Extremes = [[f32; 4]; 3];
 
 /// Borrows eight numbers of a list, from a place on.
 #[inline(always)]

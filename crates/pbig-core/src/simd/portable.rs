@@ -199,3 +199,8 @@ impl Simd for Portable {
 fn word(keys: &[f32; BLOCK], lane: usize) -> u32 {
     keys[lane].to_bits() & !(BLOCK as u32 - 1) | lane as u32
 }
+
+/// Does nothing: no stable function brings a line into the cache here.
+#[cfg(not(target_arch = "x86_64"))]
+#[inline(always)]
+pub(crate) fn prefetch<T>(_: *const T) {}

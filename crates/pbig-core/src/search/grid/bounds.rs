@@ -1,8 +1,8 @@
 //! Bounds and sizes of a set of boxes, from which the plan of a grid follows.
 
 use crate::Aabb;
+use crate::aabb::one_box;
 use crate::parallel::{map, piece_range};
-use crate::simd::one_box;
 
 /// Maximum coordinate. Larger ones count as this one, so that a width never overflows.
 const FARTHEST: f32 = 1e37;

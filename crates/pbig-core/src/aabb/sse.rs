@@ -6,7 +6,7 @@ use std::arch::x86_64::*;
 
 /// Returns both corners of a box, three lanes each; the fourth holds anything.
 #[inline(always)]
-pub(super) fn corners(aabb: &Aabb) -> (__m128, __m128) {
+pub(crate) fn corners(aabb: &Aabb) -> (__m128, __m128) {
     // SAFETY: SSE is part of the architecture. A box is six numbers; the loads are of the first four and the last four.
     unsafe {
         let first = std::ptr::from_ref(aabb).cast::<f32>();
@@ -65,11 +65,4 @@ pub(crate) fn widened<'a>(earlier: Extremes, boxes: impl IntoIterator<Item = &'a
         };
     }
     [low, high, extent].map(bytemuck::cast)
-}
-
-/// Starts to bring the cache line at `address` into the cache.
-#[inline(always)]
-pub(crate) fn prefetch<T>(address: *const T) {
-    // SAFETY: a prefetch reads nothing that could fault.
-    unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
 }

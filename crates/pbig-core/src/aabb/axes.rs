@@ -45,11 +45,6 @@ pub(crate) fn widened<'a>(earlier: Extremes, boxes: impl IntoIterator<Item = &'a
     [low, high, extent]
 }
 
-/// Does nothing: no stable function brings a line into the cache here.
-#[cfg(not(target_arch = "x86_64"))]
-#[inline(always)]
-pub(crate) fn prefetch<T>(_: *const T) {}
-
 #[cfg(test)]
 mod tests {
     use super::*;
