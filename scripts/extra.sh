@@ -156,6 +156,9 @@ run_aarch64() {
     export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
     export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
     folder="$(target_folder)/aarch64"
+    # Debian's Rust has no clippy for this.
+    ! has_target "$target" ||
+        step cargo clippy --locked --release -p pbig-core --target "$target" --target-dir "$folder" -- -D warnings
     step "${cargo[@]}" test --locked --release -p pbig-core --features serde --lib --target "$target" \
         --target-dir "$folder"
     step "${cargo[@]}" run --locked --release --package pbig-wasm --target "$target" --target-dir "$folder"
