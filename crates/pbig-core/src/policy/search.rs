@@ -19,7 +19,7 @@ pub(crate) const WORK_OF_NODE: u64 = 8;
 
 /// Maximum work in a grid for each box, in binary logarithms of their number: a tree is sorted and joined in about the same time. (With 31,
 /// the edges of two real meshes were searched in a tree after most of a grid, and took 1.5 and 3 times as long.)
-const GRID_UP_TO_LOGS_PER_BOX: u64 = 48;
+const GRID_UP_TO_LOGS_PER_BOX: u64 = 40;
 
 /// Maximum work of a join of a tree for each box, in binary logarithms of their number: streamed segment trees take about as much, 75 to
 /// 120.
@@ -57,7 +57,7 @@ mod tests {
     #[test]
     fn work_may_grow_like_boxes_and_their_logarithm() {
         assert_eq!([0, 1024, 1218, 1 << 20].map(join_up_to_work), [0, 960 << 10, 984 * 1218, 1920 << 20]);
-        assert_eq!(grid_up_to_work(1024), 480 << 10);
+        assert_eq!(grid_up_to_work(1024), 400 << 10);
         assert_eq!((in_vain(4000, 100), in_vain(4000, 1000)), (800, 0));
     }
 }
