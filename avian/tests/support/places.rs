@@ -27,7 +27,7 @@ pub(crate) enum Place {
     Last,
 }
 
-/// What to do at all places of a step.
+/// The action at each place of a step.
 #[derive(Resource, Clone, Copy)]
 struct AtPlaces(fn(&mut World, Place));
 

@@ -1,4 +1,4 @@
-//! What tests and measurements need beside rapier's own `PhysicsWorld`, and the conversion from glam, in which scenes are built.
+//! Helpers of tests and measurements around rapier's own `PhysicsWorld`, and the conversion from glam, in which scenes are built.
 
 use crate::dimension::{parts, rotation};
 use glam::{Quat, Vec3};

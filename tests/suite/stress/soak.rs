@@ -179,7 +179,7 @@ fn soak_of_a_small_world_in_the_grid() {
     tally.assert_mostly(&["grid"], 90);
 }
 
-/// So many boxes that threads share the work: a thirtieth of the updates, each of which changes thousands.
+/// Tests enough boxes for threads to share the work: a thirtieth of the updates, each of which changes thousands.
 #[test]
 fn soak_on_threads() {
     let churn = || Churn { one_in: 8, ..Churn::new(cpu(None), 20_000) };

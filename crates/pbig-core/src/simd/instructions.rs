@@ -1,4 +1,4 @@
-//! What an instruction set has, and the kernels of the inner loops on it.
+//! The primitives of an instruction set, and the kernels of the inner loops on them.
 
 use super::codes::{self, APART, SET_BITS, TOMBSTONE};
 use super::{BLOCK, Eight, EightBoxes, Steps};

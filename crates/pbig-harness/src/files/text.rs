@@ -49,7 +49,7 @@ pub(crate) struct Lines<R> {
     reader: R,
     /// Maximum length of a line, in bytes.
     longest: usize,
-    /// What a line should have, for an error.
+    /// Expected form of a line, for an error.
     expected: &'static str,
     /// The present line, without its end.
     pub(crate) bytes: Vec<u8>,

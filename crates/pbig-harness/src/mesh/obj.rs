@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::str::SplitWhitespace;
 
-/// What a line should have.
+/// Expected form of a line.
 const EXPECTED: &str = "a vertex, a face or a rod";
 
 /// Lines without geometry of their own: textures, normals, groups, materials, and what belongs to a curve or surface.
