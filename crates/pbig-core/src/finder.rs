@@ -3,11 +3,8 @@
 use crate::memory::Scratch;
 use crate::pair_device::{PairDevice, SearchRequest};
 use crate::pairs::{Grouping, Groups};
-use crate::policy::Work;
 use crate::report::{Clock, Report, stage};
-use crate::search::DeviceSlot;
-use crate::search::Outcome;
-use crate::search::{AllPairs, Request, Store};
+use crate::search::{AllPairs, DeviceSlot, Request, Store};
 use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Order, Pair, ProxyFilter};
 
 mod between;
@@ -123,8 +120,7 @@ impl Finder {
         let request = Request { grouping, ..Request::of_one(&all, &config) };
         let is_found = self.may_use_device(&request) && self.find_on_device(&all, &request)?;
         if !is_found {
-            let outcome = self.all_pairs.find(&request, &mut self.store);
-            self.add(outcome)?;
+            self.search(&request)?;
             self.emit(grouping);
         }
         self.report.pairs = self.pairs.len() as u64;
@@ -147,8 +143,7 @@ impl Finder {
             self.note_no_device();
             return false;
         }
-        let work = Work::Search(request.boxes.len() as u64);
-        self.device.is_wanted(&self.config, work, &mut self.report)
+        self.device.is_wanted(self.config.backend, Some(self.report.boxes), &mut self.report)
     }
 
     /// Reports that the wanted device cannot do this kind of search.
@@ -164,8 +159,10 @@ impl Finder {
         let (Boxes { boxes, filters, .. }, Request { config, grouping, .. }) = (*all, *request);
         let (is_sorted, max_pairs) = (grouping.is_some(), config.limits.pairs());
         let request = SearchRequest { boxes, filters, is_sorted, max_pairs };
-        let (outcome, found) = self.device.find_all(&request, std::mem::take(&mut self.pairs));
-        if !self.add(outcome)? {
+        let pairs = std::mem::take(&mut self.pairs);
+        let (done, found) = self.device.find_all(&request, pairs, &mut self.report);
+        self.count_invalid();
+        if !done? {
             return Ok(false);
         }
         let is_in_order = found.is_in_order();
@@ -177,11 +174,15 @@ impl Finder {
         Ok(true)
     }
 
-    /// Adds the outcome of a search to the report. Returns false if it was given up.
-    fn add(&mut self, outcome: Outcome) -> Result<bool, Error> {
-        let is_done = self.report.add(outcome, &self.config);
+    /// Searches on the CPU.
+    fn search(&mut self, request: &Request<'_>) -> Result<(), Error> {
+        let done = self.all_pairs.find(request, &mut self.store, &mut self.report);
+        self.count_invalid();
+        done
+    }
+
+    fn count_invalid(&mut self) {
         self.report.invalid = self.report.boxes - u64::from(self.report.plan.boxes);
-        is_done
     }
 
     /// Brings the pairs of all threads into one list, in order if there is a grouping.

@@ -34,14 +34,6 @@ impl StageTimes {
             ("diff", self.diff),
         ]
     }
-
-    pub(crate) fn add(&mut self, other: &Self) {
-        self.plan += other.plan;
-        self.map += other.map;
-        self.check += other.check;
-        self.emit += other.emit;
-        self.diff += other.diff;
-    }
 }
 
 /// A `tracing` span, target `pbig`, that lasts for the rest of the block: one for each stage, so that a
@@ -128,6 +120,13 @@ pub struct Report {
     pub fallback: Option<String>,
     /// The report on the device, if it did the work.
     pub device: Option<DeviceReport>,
+}
+
+impl Report {
+    /// Replaces the plan, but not the reason that keeps the call from a device.
+    pub(crate) fn set_plan(&mut self, plan: Plan) {
+        self.plan = Plan { no_device: self.plan.no_device, ..plan };
+    }
 }
 
 /// The report on a call that ran on a device: zero where a device measures or does nothing of the kind.

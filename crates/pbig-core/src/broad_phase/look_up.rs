@@ -1,7 +1,6 @@
 //! The update of few changed boxes: each is looked up in the tree, and what it overlaps is compared with its kept pairs.
 
 use super::Task;
-use super::tree::Tree;
 use super::world::World;
 use crate::bvh::BoxIndex;
 use crate::memory::ShrinkingVec;
@@ -10,7 +9,6 @@ use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy;
 use crate::report::{Clock, stage};
 use crate::search::Budget;
-use crate::search::{End, Outcome};
 use crate::simd::{BLOCK, Simd, dispatch};
 use crate::{Algorithm, Checks, Engine, Pair, Plan};
 
@@ -26,16 +24,16 @@ pub(super) struct LookUp {
 }
 
 impl LookUp {
-    /// Brings the tree up to date, and leaves the events of an update in the task. Gives up if it takes too much work.
-    pub(super) fn run(&mut self, task: &mut Task<'_>, tree: &mut Tree) -> Outcome {
-        let (world, mut clock, mut outcome) = (task.world, Clock::start(), Outcome::default());
+    /// Brings the tree up to date, and leaves the events of an update in the task. Returns false if it takes too much work.
+    pub(super) fn run(&mut self, task: &mut Task<'_>) -> bool {
+        let (world, mut clock) = (task.world, Clock::start());
         let (index, read) = {
             stage!("map");
-            tree.refresh_sorted(world)
+            task.tree.refresh_sorted(world)
         };
         index.in_order(&world.changed, &mut self.order);
         task.kept.make_backward();
-        outcome.stages.map = clock.lap();
+        task.report.stages.map += clock.lap();
         stage!("check");
         let is_forced = task.config.engine == Some(Engine::LookUp);
         let most = if is_forced { u64::MAX } else { policy::look_up_to_nodes(world.present.len()) };
@@ -48,14 +46,13 @@ impl LookUp {
             // Threads have stopped anywhere.
             (nodes, met) = (most, 0);
         }
-        let made = nodes * BLOCK as u64;
-        outcome.stages.check = clock.lap();
-        outcome.checks = Checks { made, unnecessary: made - met, redundant: 0 };
-        outcome.work = read as u64 + made + nodes + met;
-        outcome.plan = Plan { algorithm: Algorithm::LookUp, boxes: world.valid, ..Plan::default() };
-        outcome.end = if budget.is_over() { End::GivenUp } else { End::Done };
-        tree.note_look_ups(nodes, budget.is_over());
-        outcome
+        let (report, made) = (&mut *task.report, nodes * BLOCK as u64);
+        report.stages.check += clock.lap();
+        report.checks = Checks { made, unnecessary: made - met, redundant: 0 };
+        report.work += read as u64 + made + nodes + met;
+        report.set_plan(Plan { algorithm: Algorithm::LookUp, boxes: world.valid, ..Plan::default() });
+        task.tree.note_look_ups(nodes, budget.is_over());
+        !budget.is_over()
     }
 
     /// Looks the changed boxes up. Some are left out if the budget does not suffice.

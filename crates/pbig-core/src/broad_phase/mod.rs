@@ -25,6 +25,7 @@ use crate::simd::prefetch;
 use crate::{Aabb, Algorithm, Backend, Config, Error, Limits, Pair, PairDevice, ProxyFilter};
 use look_up::LookUp;
 use search::Search;
+use tree::Tree;
 use world::World;
 
 /// Number of boxes between a prefetch and the use of its box.
@@ -86,10 +87,12 @@ pub struct BroadPhase {
 /// An update: what it reads, and where it leaves the events.
 struct Task<'a> {
     world: &'a World,
+    tree: &'a mut Tree,
     config: &'a Config,
     kept: &'a mut Kept,
     /// The events. Cleared first, and left sorted.
     events: &'a mut Comparison,
+    report: &'a mut Report,
 }
 
 impl BroadPhase {

@@ -2,15 +2,12 @@
 //! Where most ids have no box, the present boxes are listed first, and the search knows them by their places in the list.
 
 use super::Task;
-use super::tree::Tree;
 use super::world::World;
 use crate::pairs::{Grouping, Groups, Kept};
 use crate::policy;
-use crate::report::{Clock, stage};
-use crate::search::DeviceSlot;
-use crate::search::{AllPairs, Request, Store};
-use crate::search::{End, Outcome};
-use crate::{Aabb, Algorithm, Boxes, Config, Pair, ProxyFilter};
+use crate::report::{Clock, Report, stage};
+use crate::search::{AllPairs, DeviceSlot, Request, Store};
+use crate::{Aabb, Algorithm, Boxes, Config, Error, Pair, ProxyFilter};
 
 /// The buffers of a search.
 #[derive(Clone, Debug, Default)]
@@ -22,14 +19,13 @@ pub(super) struct Search {
 }
 
 impl Search {
-    /// Leaves the events of an update in the task, or replaces the kept pairs by the found ones, too. Gives up, and leaves all as it
+    /// Leaves the events of an update in the task, or replaces the kept pairs by the found ones, too. Returns false, and leaves all as it
     /// is, if it is given a device that could not find them.
     pub(super) fn run(
         &mut self,
         task: &mut Task<'_>,
-        tree: &mut Tree,
         device: Option<&mut DeviceSlot>,
-    ) -> Outcome {
+    ) -> Result<bool, Error> {
         let world = task.world;
         let is_listed = policy::is_listed(world.present.len(), world.ids());
         let (mut boxes, mut filters) = (&world.boxes, &world.filters);
@@ -41,20 +37,17 @@ impl Search {
         let is_on_device = device.is_some();
         self.groups.may_repeat = is_on_device;
         let parts = (&mut self.all_pairs, &mut self.store);
-        let mut outcome = search(parts, &all, task.config, device);
-        outcome.work += (boxes.len() - world.present.len()) as u64;
-        if outcome.end != End::Done {
-            return outcome;
+        task.report.work += (boxes.len() - world.present.len()) as u64;
+        if !search(parts, &all, task.config, device, task.report)? {
+            return Ok(false);
         }
         if self.store.has_tree && !is_on_device && !is_listed {
-            tree.adopt(&mut self.store.tree);
+            task.tree.adopt(&mut self.store.tree);
         }
         let mut clock = Clock::start();
-        let is_brute =
-            !is_on_device && matches!(outcome.plan.algorithm, Algorithm::Brute | Algorithm::Nothing);
-        outcome.has_replaced_kept = self.compare(task, is_brute, is_listed);
-        outcome.stages.diff = clock.lap();
-        outcome
+        self.compare(task, is_on_device, is_listed);
+        task.report.stages.diff += clock.lap();
+        Ok(true)
     }
 
     /// The next searches begin with streamed segment trees, as after grids and trees that took too much work.
@@ -70,9 +63,11 @@ impl Search {
         self.groups.settle(pairs);
     }
 
-    /// Compares the found pairs with the kept ones. Returns true if it has replaced these.
-    fn compare(&mut self, task: &mut Task<'_>, is_brute: bool, is_listed: bool) -> bool {
+    /// Compares the found pairs with the kept ones.
+    fn compare(&mut self, task: &mut Task<'_>, is_on_device: bool, is_listed: bool) {
         stage!("diff");
+        let algorithm = task.report.plan.algorithm;
+        let is_brute = !is_on_device && matches!(algorithm, Algorithm::Brute | Algorithm::Nothing);
         let world = task.world;
         if world.has_removed() {
             drop_pairs_of_removed(world, task.kept);
@@ -85,8 +80,7 @@ impl Search {
                 .pairs
                 .iter()
                 .map(|pair| Pair { a: name(pair.a), b: name(pair.b) });
-            task.events.compare_sorted(world.present.iter(), found, task.kept);
-            return false;
+            return task.events.compare_sorted(world.present.iter(), found, task.kept);
         }
         let boxes = names.map_or(world.ids(), <[u32]>::len);
         self.all_pairs.gather(Grouping::new(boxes), &mut self.groups);
@@ -94,23 +88,23 @@ impl Search {
             self.groups.rename_partners(names);
         }
         task.events.run((&mut self.groups, names), task.kept, AllPairs::workers(boxes));
-        true
     }
 }
 
-/// Leaves the pairs of all boxes in `all_pairs`.
+/// Leaves the pairs of all boxes in `all_pairs`. Returns false if a device could not find them.
 fn search(
     (all_pairs, store): (&mut AllPairs, &mut Store),
     all: &Boxes<'_>,
     config: &Config,
     device: Option<&mut DeviceSlot>,
-) -> Outcome {
+    report: &mut Report,
+) -> Result<bool, Error> {
     let grouping = Some(Grouping::new(all.boxes.len()));
     match device {
-        Some(device) => all_pairs.find_on(device, all, config, grouping),
+        Some(device) => all_pairs.find_on(device, all, config, grouping, report),
         None => {
             let request = Request { grouping, is_repeated: true, ..Request::of_one(all, config) };
-            all_pairs.find(&request, store)
+            all_pairs.find(&request, store, report).map(|()| true)
         }
     }
 }

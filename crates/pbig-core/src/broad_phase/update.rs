@@ -1,22 +1,11 @@
 //! An update: look up or search, keep the pairs, report.
 
-use super::look_up::LookUp;
-use super::search::Search;
 use super::tree::Tree;
 use super::{BroadPhase, Events, Task};
 use crate::pairs::Comparison;
-use crate::policy::{self, Work};
+use crate::policy;
 use crate::report::Clock;
-use crate::search::DeviceSlot;
-use crate::search::{End, Outcome};
 use crate::{Backend, Engine, Error, Plan};
-
-/// The ways to find events, with their buffers.
-struct Parts<'a> {
-    device: &'a mut DeviceSlot,
-    look_up: &'a mut LookUp,
-    search: &'a mut Search,
-}
 
 impl BroadPhase {
     /// Finds what has changed since the last update. Takes next to no time when nothing has.
@@ -51,37 +40,49 @@ impl BroadPhase {
             return Ok(());
         }
         self.kept.reserve_ids(self.world.ids());
-        self.find_events()?;
         let mut tree = std::mem::take(&mut self.world.tree);
-        tree.end_update(&self.world);
+        let done = self.find_events(&mut tree).and_then(|()| self.apply_events());
+        if done.is_ok() {
+            tree.end_update(&self.world);
+            self.world.forget_changes();
+        }
         self.world.tree = tree;
-        self.world.forget_changes();
-        Ok(())
+        self.last = self.report.plan.algorithm;
+        done
     }
 
-    fn find_events(&mut self) -> Result<(), Error> {
+    fn find_events(&mut self, tree: &mut Tree) -> Result<(), Error> {
+        if self.device.is_wanted(self.config.backend, None, &mut self.report) && self.search(tree, true)? {
+            return Ok(());
+        }
         let changed = self.world.changed.len();
-        if self.device.is_wanted(&self.config, Work::Update, &mut self.report) {
-            let outcome = self.run(|parts, task, tree| parts.search.run(task, tree, Some(parts.device)));
-            if self.take(outcome)? {
+        if self.chooses_look_ups(tree, changed) {
+            let is_done = self.look_up(tree);
+            self.given_up.note(!is_done, changed);
+            if is_done {
                 return Ok(());
             }
         }
-        if self.chooses_look_ups(changed) {
-            let outcome = self.run(|parts, task, tree| parts.look_up.run(task, tree));
-            self.given_up.note(outcome.end == End::GivenUp, changed);
-            if self.take(outcome)? {
-                return Ok(());
-            }
-        }
-        let outcome = self.run(|parts, task, tree| parts.search.run(task, tree, None));
-        let is_done = self.take(outcome)?;
+        let is_done = self.search(tree, false)?;
         debug_assert!(is_done, "a search on the CPU never gives up");
         Ok(())
     }
 
+    /// Looks the changed boxes up. Returns false if that takes too much work.
+    fn look_up(&mut self, tree: &mut Tree) -> bool {
+        let Self { look_up, world, config, kept, comparison: events, report, .. } = self;
+        look_up.run(&mut Task { world, tree, config, kept, events, report })
+    }
+
+    /// Searches all boxes, on the device or the CPU. Returns false if the device could not do it.
+    fn search(&mut self, tree: &mut Tree, is_on_device: bool) -> Result<bool, Error> {
+        let Self { device, search, world, config, kept, comparison: events, report, .. } = self;
+        let mut task = Task { world, tree, config, kept, events, report };
+        search.run(&mut task, is_on_device.then_some(device))
+    }
+
     /// Chooses whether the changed boxes are looked up. A search that is made because look-ups were given up counts as one of those to come.
-    fn chooses_look_ups(&mut self, changed: usize) -> bool {
+    fn chooses_look_ups(&mut self, tree: &mut Tree, changed: usize) -> bool {
         match self.config.engine {
             _ if self.config.backend == Backend::Brute => return false,
             Some(engine) => return engine == Engine::LookUp,
@@ -91,7 +92,8 @@ impl BroadPhase {
         if !policy::may_look_up(boxes, changed) || self.given_up.forbids(changed) {
             return false;
         }
-        let are_few = policy::may_place(boxes, self.world.arrivals());
+        let arrivals = tree.arrivals(&self.world.boxes, &self.world.changed);
+        let are_few = policy::may_place(boxes, arrivals);
         if !are_few && self.jumped.forbids(0) {
             return false;
         }
@@ -99,29 +101,11 @@ impl BroadPhase {
         true
     }
 
-    /// Runs one of the ways to make an update.
-    fn run(&mut self, way: impl FnOnce(Parts<'_>, &mut Task<'_>, &mut Tree) -> Outcome) -> Outcome {
-        let mut tree = std::mem::take(&mut self.world.tree);
-        let Self { device, look_up, search, world, config, kept, comparison: events, .. } = self;
-        let mut task = Task { world, config, kept, events };
-        let outcome = way(Parts { device, look_up, search }, &mut task, &mut tree);
-        self.world.tree = tree;
-        outcome
-    }
-
-    /// Adds an outcome to the report, and applies the events to the kept pairs. Returns false if it was given up.
-    fn take(&mut self, outcome: Outcome) -> Result<bool, Error> {
-        let has_replaced_kept = outcome.has_replaced_kept;
-        self.last = outcome.plan.algorithm;
-        let is_done = self.report.add(outcome, &self.config)?;
-        if is_done && !has_replaced_kept {
-            self.apply_events()?;
-        }
-        Ok(is_done)
-    }
-
-    /// Keeps the added pairs, and forgets the ended ones.
+    /// Keeps the added pairs, and forgets the ended ones, unless the search has replaced the kept pairs.
     fn apply_events(&mut self) -> Result<(), Error> {
+        if self.comparison.is_kept {
+            return Ok(());
+        }
         let mut clock = Clock::start();
         let events = &self.comparison;
         let gone = events.removed.len() + events.dropped.len();

@@ -207,11 +207,6 @@ impl World {
         self.present.remove(id);
     }
 
-    /// Returns how many of the changed boxes need new places in the tree.
-    pub(super) fn arrivals(&mut self) -> usize {
-        self.tree.arrivals(&self.boxes, &self.changed)
-    }
-
     /// Forgets all changes, after an update. The tree has noted them.
     pub(super) fn forget_changes(&mut self) {
         if self.changed.len() * FORGET_ONE_BY_ONE_IN > self.ids() {

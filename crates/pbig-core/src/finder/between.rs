@@ -71,10 +71,10 @@ impl Finder {
             grouping,
             ..Request::new(first, &self.config)
         };
-        let outcome = self.all_pairs.find(&request, &mut self.store);
-        let is_done = self.add(outcome);
+        let done = self.all_pairs.find(&request, &mut self.store, &mut self.report);
+        self.count_invalid();
         self.report.invalid -= self.sets.dropped;
-        is_done?;
+        done?;
         self.report.pairs = self.all_pairs.count();
         if visit.is_none() {
             self.emit_between(grouping);

@@ -36,9 +36,8 @@ impl Finder {
         self.begin(&[all])?;
         self.note_no_device();
         let receiver = |pairs: &[Pair]| pairs.iter().for_each(|pair| visit(*pair));
-        let request = Request { receiver: Some(&receiver), ..Request::of_one(&all, &self.config) };
-        let outcome = self.all_pairs.find(&request, &mut self.store);
-        self.add(outcome)?;
+        let config = self.config;
+        self.search(&Request { receiver: Some(&receiver), ..Request::of_one(&all, &config) })?;
         self.report.pairs = self.all_pairs.count();
         Ok(self.report.pairs)
     }

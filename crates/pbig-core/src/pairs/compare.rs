@@ -16,6 +16,8 @@ pub(crate) struct Comparison {
     pub(crate) removed: ShrinkingVec<Pair>,
     /// Kept pairs of removed boxes, which end without an event.
     pub(crate) dropped: ShrinkingVec<Pair>,
+    /// True if the found pairs have replaced the kept ones. Otherwise the events have to be applied to these.
+    pub(crate) is_kept: bool,
     /// By group.
     parts: Vec<Part>,
     /// Buffers of a sort.
@@ -67,6 +69,7 @@ impl Comparison {
         kept.next = next;
         self.gather();
         kept.adopt_next(names, &self.added, &self.removed);
+        self.is_kept = true;
     }
 
     /// Compares sorted pairs with the kept ones. Only the ids `present` have pairs.
@@ -103,6 +106,7 @@ impl Comparison {
         self.added.clear();
         self.removed.clear();
         self.dropped.clear();
+        self.is_kept = false;
     }
 
     /// Sorts events that were found in any order.

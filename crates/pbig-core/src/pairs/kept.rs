@@ -330,17 +330,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn pairs_that_no_row_has_do_not_exist() {
-        let mut kept = Kept::default();
-        kept.reserve_ids(100);
-        let pairs: Vec<Pair> = (0..60).map(|i| Pair { a: i, b: 99 }).collect();
-        kept.apply(&pairs, &[]);
-        let unknown = [Pair { a: 1, b: 98 }, Pair { a: 70, b: 99 }, Pair { a: 5000, b: 5001 }];
-        let asked = [&unknown[..], &pairs, &unknown].concat();
-        assert!(asked.into_iter().filter(|pair| kept.contains(*pair)).eq(pairs));
-    }
-
     /// Batches of every size, whose pairs share `a`, share `b` or neither, beside a set of pairs.
     #[test]
     fn rows_equal_a_set_after_changes_of_many_pairs_at_once() {

@@ -140,17 +140,6 @@ pub(crate) fn differences(id: u32, old: &[u32], new: &[u32], added: &mut Vec<Pai
 mod tests {
     use super::*;
 
-    #[test]
-    fn differences_are_those_of_sets() {
-        let (mut added, mut removed) = (vec![], vec![]);
-        differences(1, &[2, 4, 6, 9], &[3, 4, 9, 12], &mut added, &mut removed);
-        assert_eq!(added, [3, 12].map(|b| Pair { a: 1, b }));
-        assert_eq!(removed, [2, 6].map(|b| Pair { a: 1, b }));
-        differences(5, &[], &[7], &mut added, &mut removed);
-        differences(6, &[8], &[], &mut added, &mut removed);
-        assert_eq!((added[2], removed[2]), (Pair { a: 5, b: 7 }, Pair { a: 6, b: 8 }));
-    }
-
     fn compared(simd: impl Simd, old: &[u32], new: &[u32]) -> [Vec<Pair>; 2] {
         let [mut added, mut removed] = [vec![], vec![]];
         compare(simd, 1, (old, 0..3), (new, 0..4), (&mut added, &mut removed));

@@ -89,20 +89,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn few_changes_are_looked_up() {
-        assert!(may_look_up(1000, 200) && !may_look_up(1000, 201));
-        assert!(may_look_up(500, 250) && !may_look_up(500, 251));
-        assert!(may_look_up(80_000, 10_000) && !may_look_up(80_000, 10_001));
-        assert!(may_look_up(16, 1) && !may_look_up(15, 1));
-        assert_eq!(look_up_to_nodes(10_000), 60_000);
-    }
-
-    #[test]
-    fn boxes_are_listed_if_half_of_the_ids_have_none() {
-        assert!(is_listed(500, 1000) && !is_listed(501, 1000));
-    }
-
-    #[test]
     fn updates_that_would_be_given_up_are_searches_at_once() {
         let mut given_up = GivenUp::default();
         let mut searches = || {

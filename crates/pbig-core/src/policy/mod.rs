@@ -10,7 +10,7 @@ mod engine;
 pub(crate) mod search;
 
 pub use backend::NoDevice;
-pub(crate) use backend::{Choice, Work, choose_backend};
+pub(crate) use backend::no_device;
 pub(crate) use engine::{
     GivenUp, PARALLEL_FROM_CHANGES, is_listed, look_up_to_nodes, may_look_up, may_place,
 };

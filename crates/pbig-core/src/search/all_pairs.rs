@@ -4,14 +4,16 @@
 use super::brute::{brute_force, brute_force_across};
 use super::grid::{Grid, GridPlan, TwoGrids};
 use super::hits::{ById, Hits, Receiver, Rule};
-use super::{Budget, DeviceSlot, End, Outcome, join, streamed};
+use super::{Budget, DeviceSlot, join, streamed};
 use crate::bvh::BoxIndex;
 use crate::memory::{Scratch, ShrinkingVec};
 use crate::pairs::{Grouping, Groups};
 use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
-use crate::report::{Checks, Clock, stage};
-use crate::{Aabb, Algorithm, Backend, Boxes, Config, Engine, Keys, Pair, Plan, ProxyFilter, SearchRequest};
+use crate::report::{Checks, Clock, Report, stage};
+use crate::{
+    Aabb, Algorithm, Backend, Boxes, Config, Engine, Error, Keys, Pair, Plan, ProxyFilter, SearchRequest,
+};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A search: boxes, filters and settings.
@@ -129,39 +131,41 @@ impl AllPairs {
     }
 
     /// Leaves all pairs in `hits`, and the boxes in `store` unless they were too few.
-    pub(crate) fn find(&mut self, request: &Request<'_>, store: &mut Store) -> Outcome {
-        let mut outcome = Outcome::default();
+    pub(crate) fn find(
+        &mut self,
+        request: &Request<'_>,
+        store: &mut Store,
+        report: &mut Report,
+    ) -> Result<(), Error> {
         self.begin(request);
         store.has_tree = false;
         let found = AtomicU64::new(0);
         let rule = request.rule(&found);
         if request.is_for_brute_force() {
-            self.test_all(request, &rule, &mut outcome);
-            return self.finish(&rule, outcome);
+            self.test_all(request, &rule, report);
+            return self.finish(&rule, report);
         }
         let before = (store.grids, store.trees);
-        self.search(request, store, &rule, &mut outcome);
-        let outcome = self.finish(&rule, outcome);
-        if outcome.end == End::TooManyPairs {
+        self.search(request, store, &rule, report);
+        let done = self.finish(&rule, report);
+        if done.is_err() {
             // The limit of pairs or the budget may end a way first: threads differ in time.
             (store.grids, store.trees) = before;
         }
-        outcome
+        done
     }
 
-    /// Hands the last pairs to the receiver, and returns the outcome with its counts.
-    fn finish(&mut self, rule: &Rule<'_>, mut outcome: Outcome) -> Outcome {
+    /// Hands the last pairs to the receiver, and reports the counts.
+    fn finish(&mut self, rule: &Rule<'_>, report: &mut Report) -> Result<(), Error> {
         if let Some(receiver) = rule.receiver {
             self.hits.iter_mut().for_each(|hits| hits.hand_over(receiver));
         }
         let sum = |of: fn(&Hits) -> u64| self.hits.iter().map(of).sum::<u64>();
         let (made, overlaps) = (sum(|hits| hits.tests), sum(|hits| hits.overlaps));
-        outcome.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
-        outcome.work += sum(Hits::work);
-        if self.hits.iter().any(Hits::is_full) || self.count() > rule.max_pairs {
-            return Outcome { end: End::TooManyPairs, ..outcome };
-        }
-        Outcome { end: End::Done, ..outcome }
+        report.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
+        report.work += sum(Hits::work);
+        let are_too_many = self.hits.iter().any(Hits::is_full) || self.count() > rule.max_pairs;
+        if are_too_many { Err(Error::TooManyPairs { limit: rule.max_pairs }) } else { Ok(()) }
     }
 
     /// Returns the number of pairs of the last search.
@@ -175,7 +179,7 @@ impl AllPairs {
         self.hits.iter_mut().for_each(|hits| hits.begin(request.grouping));
     }
 
-    fn test_all(&mut self, request: &Request<'_>, rule: &Rule<'_>, outcome: &mut Outcome) {
+    fn test_all(&mut self, request: &Request<'_>, rule: &Rule<'_>, report: &mut Report) {
         stage!("check");
         let mut clock = Clock::start();
         let boxes = match request.others {
@@ -183,15 +187,15 @@ impl AllPairs {
             None => brute_force(request.boxes, rule, &mut self.hits[0]),
         };
         let algorithm = if boxes < 2 { Algorithm::Nothing } else { Algorithm::Brute };
-        outcome.plan = Plan { algorithm, boxes: boxes as u32, ..Plan::default() };
-        outcome.stages.check += clock.lap();
+        report.set_plan(Plan { algorithm, boxes: boxes as u32, ..Plan::default() });
+        report.stages.check += clock.lap();
     }
 
-    fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, outcome: &mut Outcome) {
+    fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, report: &mut Report) {
         let is_forced = request.config.engine == Some(Engine::Tree);
         let is_hard = request.is_repeated && store.grids.forbids(request.count());
         if !is_forced && !is_hard {
-            let is_done = self.search_grid(request, store, rule, outcome);
+            let is_done = self.search_grid(request, store, rule, report);
             store.grids.note(!is_done, request.count());
             if is_done {
                 return;
@@ -199,13 +203,13 @@ impl AllPairs {
         }
         let is_hard = request.is_repeated && store.trees.forbids(request.count());
         if is_forced || !is_hard {
-            let is_done = self.search_tree(request, store, rule, outcome);
+            let is_done = self.search_tree(request, store, rule, report);
             store.trees.note(!is_done, request.count());
             if is_done {
                 return;
             }
         }
-        self.stream(request, store, rule, outcome);
+        self.stream(request, store, rule, report);
     }
 
     /// Finds the pairs in a grid. Returns false if that takes too much work.
@@ -214,7 +218,7 @@ impl AllPairs {
         request: &Request<'_>,
         store: &mut Store,
         rule: &Rule<'_>,
-        outcome: &mut Outcome,
+        report: &mut Report,
     ) -> bool {
         let (boxes, workers) = (request.boxes, self.hits.len());
         let mut clock = Clock::start();
@@ -222,7 +226,7 @@ impl AllPairs {
             stage!("plan");
             GridPlan::new(boxes, request.others, workers)
         };
-        outcome.stages.plan += clock.lap();
+        report.stages.plan += clock.lap();
         let sorted = {
             stage!("map");
             match request.others {
@@ -230,17 +234,17 @@ impl AllPairs {
                 None => store.grid.build(plan, boxes, workers),
             }
         };
-        outcome.stages.map += clock.lap();
-        outcome.plan = plan.told(sorted.boxes(), sorted.oversize_count());
+        report.stages.map += clock.lap();
+        report.set_plan(plan.told(sorted.boxes(), sorted.oversize_count()));
         stage!("check");
         let most = search::grid_up_to_work(sorted.boxes());
         // A receiver's search runs twice if it may fail, so it may as well take twice the budget.
         let is_sure = request.config.engine == Some(Engine::Grid)
             || rule.receiver.is_some() && sorted.takes_at_most(2 * most);
-        let is_done = self.run_within((!is_sure).then_some(most), request, rule, outcome, |rule, hits| {
+        let is_done = self.run_within((!is_sure).then_some(most), request, rule, report, |rule, hits| {
             sorted.search(rule, hits);
         });
-        outcome.stages.check += clock.lap();
+        report.stages.check += clock.lap();
         is_done
     }
 
@@ -250,7 +254,7 @@ impl AllPairs {
         request: &Request<'_>,
         Store { tree, has_tree, both_sets, .. }: &mut Store,
         rule: &Rule<'_>,
-        outcome: &mut Outcome,
+        report: &mut Report,
     ) -> bool {
         let mut clock = Clock::start();
         let (boxes, split) = request.in_one_list(both_sets);
@@ -259,26 +263,26 @@ impl AllPairs {
             tree.sort_sets(boxes, split);
         }
         *has_tree = true;
-        outcome.stages.map += clock.lap();
+        report.stages.map += clock.lap();
         stage!("check");
-        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: tree.len() as u32, ..Plan::default() };
+        report.set_plan(Plan { algorithm: Algorithm::Tree, boxes: tree.len() as u32, ..Plan::default() });
         let most = search::join_up_to_work(tree.len());
         let most = (request.config.engine != Some(Engine::Tree)).then_some(most);
-        let is_done = self.run_within(most, request, rule, outcome, |rule, hits| {
+        let is_done = self.run_within(most, request, rule, report, |rule, hits| {
             join::find_pairs(tree, split, rule, hits);
         });
-        outcome.stages.check += clock.lap();
+        report.stages.check += clock.lap();
         is_done
     }
 
     /// Finds the pairs by streamed segment trees: a tree does not cut boxes apart that cross.
-    fn stream(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, outcome: &mut Outcome) {
+    fn stream(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, report: &mut Report) {
         stage!("check");
         let mut clock = Clock::start();
         let (boxes, split) = request.in_one_list(&mut store.both_sets);
         let valid = streamed::find_pairs(boxes, split, rule, &mut self.hits);
-        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: valid as u32, ..Plan::default() };
-        outcome.stages.check += clock.lap();
+        report.set_plan(Plan { algorithm: Algorithm::Tree, boxes: valid as u32, ..Plan::default() });
+        report.stages.check += clock.lap();
     }
 
     /// Runs a search that may take at most some work in vain, or any. Returns false, and leaves no pairs, if it takes more. A receiver
@@ -288,7 +292,7 @@ impl AllPairs {
         most: Option<u64>,
         request: &Request<'_>,
         rule: &Rule<'_>,
-        outcome: &mut Outcome,
+        report: &mut Report,
         search: impl Fn(&Rule<'_>, &mut [Hits]),
     ) -> bool {
         if let Some(most) = most {
@@ -300,7 +304,7 @@ impl AllPairs {
                 return true;
             }
             // Where threads stop is a matter of time.
-            outcome.work += if budget.is_over() { most } else { self.hits.iter().map(Hits::work).sum() };
+            report.work += if budget.is_over() { most } else { self.hits.iter().map(Hits::work).sum() };
             self.begin(request);
             rule.found.store(0, Ordering::Relaxed);
             if budget.is_over() {
@@ -325,25 +329,26 @@ impl AllPairs {
         self.answer.settle(pairs);
     }
 
-    /// Leaves the pairs that a device finds in `hits`. Gives up if it could not find them.
+    /// Leaves the pairs that a device finds in `hits`. Returns false if it could not find them.
     pub(crate) fn find_on(
         &mut self,
         device: &mut DeviceSlot,
         all: &Boxes<'_>,
         config: &Config,
         grouping: Option<Grouping>,
-    ) -> Outcome {
+        report: &mut Report,
+    ) -> Result<bool, Error> {
         let Boxes { boxes, filters, .. } = *all;
         let max_pairs = config.limits.pairs();
         // Rows are sorted later, by several threads.
         let request = SearchRequest { boxes, filters, is_sorted: false, max_pairs };
-        let (outcome, found) = device.find_all(&request, std::mem::take(&mut self.answer));
+        let (done, found) = device.find_all(&request, std::mem::take(&mut self.answer), report);
         let mut found = found.into_vec();
-        if outcome.end == End::Done {
+        if done == Ok(true) {
             self.take(&mut found, grouping);
         }
         *self.answer = found;
-        outcome
+        done
     }
 
     /// Takes pairs that a device has found. Several threads copy and count them.

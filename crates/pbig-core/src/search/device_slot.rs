@@ -1,10 +1,9 @@
 //! The device of a finder or a broad phase, if it has one, and the report of a device that cannot do the work.
 
-use super::{End, Outcome};
 use crate::pair_device::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
-use crate::policy::{Choice, Work, choose_backend};
-use crate::report::{Clock, Report, StageTimes, stage};
-use crate::{Algorithm, Config, Pair, PairList, Plan};
+use crate::policy::no_device;
+use crate::report::{Clock, Report, stage};
+use crate::{Algorithm, Backend, Error, Pair, PairList, Plan};
 use std::time::Duration;
 
 /// Room for a device. A clone has a device of its own.
@@ -25,15 +24,18 @@ impl DeviceSlot {
         self.device.as_ref()?.name()
     }
 
-    /// Returns true if a call should run on the device. Otherwise the report gets the reason.
-    pub(crate) fn is_wanted(&mut self, config: &Config, work: Work, report: &mut Report) -> bool {
+    /// Returns true if a call should run on the device: an update, or a search of this number of boxes. Otherwise the report gets the
+    /// reason.
+    pub(crate) fn is_wanted(&mut self, backend: Backend, searched: Option<u64>, report: &mut Report) -> bool {
         let is_software = self.device.as_ref().map(|device| device.is_software());
-        let choice = choose_backend(config.backend, is_software, work);
-        report.plan.no_device = if let Choice::Cpu(why) = choice { why } else { None };
-        if choice == Choice::Device && is_software.is_none() {
+        if backend == Backend::Auto {
+            report.plan.no_device = no_device(is_software, searched);
+            return report.plan.no_device.is_none();
+        }
+        if backend == Backend::Device && is_software.is_none() {
             report.fallback = Some(self.fall_back("no device was given"));
         }
-        choice == Choice::Device && is_software.is_some()
+        backend == Backend::Device && is_software.is_some()
     }
 
     /// Returns the reason why the wanted backend could not do the work. Logs the first of several failures in a row as a warning.
@@ -45,32 +47,36 @@ impl DeviceSlot {
         why
     }
 
-    /// Finds all pairs on the device, with the memory of `pairs`, and returns them. Gives up if the device could not do it.
+    /// Finds all pairs on the device, with the memory of `pairs`, and returns them; and false if the device could not do it.
     pub(crate) fn find_all(
         &mut self,
         request: &SearchRequest<'_>,
         mut pairs: Vec<Pair>,
-    ) -> (Outcome, PairList) {
+        report: &mut Report,
+    ) -> (Result<bool, Error>, PairList) {
         stage!("device");
         pairs.clear();
         let mut found = DeviceFound { pairs: pairs.into(), ..DeviceFound::default() };
         let mut clock = Clock::start();
-        let Some(device) = &mut self.device else { return (Outcome::default(), found.pairs) };
-        let outcome = match device.find_all(request, &mut found).and_then(|()| check(&mut found, request)) {
+        let Some(device) = &mut self.device else { return (Ok(false), found.pairs) };
+        let done = match device.find_all(request, &mut found).and_then(|()| check(&mut found, request)) {
             Ok(()) => {
                 self.has_warned = false;
                 found.report.name = self.name().unwrap_or_default().to_owned();
-                success(&found, clock.lap())
+                add_to(report, &mut found, clock.lap());
+                Ok(true)
             }
-            Err(DeviceFailure::TooManyPairs) => Outcome { end: End::TooManyPairs, ..Outcome::default() },
+            Err(DeviceFailure::TooManyPairs) => Err(Error::TooManyPairs { limit: request.max_pairs }),
             Err(DeviceFailure::Declined(why)) => {
-                Outcome { fallback: Some(by_cpu(&why)), ..Outcome::default() }
+                report.fallback = Some(by_cpu(&why));
+                Ok(false)
             }
             Err(DeviceFailure::Failed(why)) => {
-                Outcome { fallback: Some(self.fall_back(&why)), ..Outcome::default() }
+                report.fallback = Some(self.fall_back(&why));
+                Ok(false)
             }
         };
-        (outcome, found.pairs)
+        (done, found.pairs)
     }
 }
 
@@ -78,19 +84,17 @@ fn by_cpu(why: &str) -> String {
     format!("{why}: the CPU does the work")
 }
 
-/// Returns what the device did in this time.
-fn success(found: &DeviceFound, time: Duration) -> Outcome {
+/// Reports what the device did in this time.
+fn add_to(report: &mut Report, found: &mut DeviceFound, time: Duration) {
     // The rest of the call is check, sort, transfer and decoding.
     let map = found.report.map.min(time);
+    report.stages.map += map;
+    report.stages.check += time - map;
+    report.checks = found.checks;
     let algorithm = if found.valid < 2 { Algorithm::Nothing } else { Algorithm::Device };
-    Outcome {
-        end: End::Done,
-        checks: found.checks,
-        plan: Plan { algorithm, boxes: found.valid, device: found.plan.clone(), ..Plan::default() },
-        stages: StageTimes { map, check: time - map, ..StageTimes::default() },
-        device: Some(found.report.clone()),
-        ..Outcome::default()
-    }
+    report.set_plan(Plan { algorithm, boxes: found.valid, device: found.plan.take(), ..Plan::default() });
+    report.device = Some(std::mem::take(&mut found.report));
+    report.fallback = None;
 }
 
 /// Returns an error if an answer has too many pairs, or not the form that a device promises.

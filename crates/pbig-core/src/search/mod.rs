@@ -13,7 +13,6 @@ mod device_slot;
 pub(crate) mod grid;
 mod hits;
 mod join;
-mod outcome;
 mod record;
 mod streamed;
 
@@ -21,4 +20,3 @@ pub(crate) use all_pairs::{AllPairs, Request, Store};
 pub(crate) use budget::Budget;
 pub(crate) use device_slot::DeviceSlot;
 pub(crate) use hits::{ById, Receiver};
-pub(crate) use outcome::{End, Outcome};
