@@ -48,7 +48,6 @@ impl<'a> Boxes<'a> {
         Self { keys: Some(keys), ..self }
     }
 
-    /// Returns an error if there is not one filter, or entry of keys, for each box.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let boxes = self.boxes.len();
         match (self.filters.map_or(boxes, <[_]>::len), self.keys.map_or(boxes, <[_]>::len)) {

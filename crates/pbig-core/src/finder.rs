@@ -8,7 +8,6 @@ use crate::search::{AllPairs, DeviceSlot, Request, Store};
 use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Order, Pair, ProxyFilter};
 
 mod between;
-mod for_each;
 mod sets;
 
 use sets::Sets;
@@ -110,6 +109,43 @@ impl Finder {
         self.list(Boxes::new(boxes).with_keys(keys))
     }
 
+    /// Calls `visit` once for every pair of overlapping boxes, in any order, on each thread that finds some. Returns the number of
+    /// pairs.
+    ///
+    /// There is no list, so memory does not grow with the pairs, and [`crate::Limits::max_pairs`] does not apply: each thread
+    /// gathers a few thousand pairs before it hands them over. The CPU does the work; no device is asked. A panic in `visit`
+    /// reaches the caller when the other threads have ended; the finder stays usable.
+    ///
+    /// ```
+    /// use pbig_core::{Aabb, Finder};
+    /// use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+    /// let boxes = [[0.0; 3], [0.5; 3], [0.9; 3]].map(|center| Aabb::from_center(center, [0.5; 3]));
+    /// let neighbours = [const { AtomicU32::new(0) }; 3];
+    /// let pairs = Finder::default().for_each_pair(&boxes, |pair| {
+    ///     neighbours[pair.a as usize].fetch_add(1, Relaxed);
+    ///     neighbours[pair.b as usize].fetch_add(1, Relaxed);
+    /// })?;
+    /// assert_eq!((pairs, neighbours.map(AtomicU32::into_inner)), (3, [2; 3]));
+    /// # Ok::<(), pbig_core::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::TooManyBoxes`], [`Error::FilterCount`] and [`Error::KeyCount`], before any call.
+    pub fn for_each_pair<'a>(
+        &mut self,
+        boxes: impl Into<Boxes<'a>>,
+        visit: impl Fn(Pair) + Sync,
+    ) -> Result<u64, Error> {
+        let all = boxes.into();
+        self.begin(&[all])?;
+        self.note_no_device();
+        let receiver = |pairs: &[Pair]| pairs.iter().for_each(|pair| visit(*pair));
+        let config = self.config;
+        self.search(&Request { receiver: Some(&receiver), ..Request::of_one(&all, &config) })?;
+        self.report.pairs = self.all_pairs.count();
+        Ok(self.report.pairs)
+    }
+
     fn list(&mut self, all: Boxes<'_>) -> Result<&[Pair], Error> {
         self.pairs.clear();
         self.begin(&[all])?;
@@ -154,7 +190,6 @@ impl Finder {
         }
     }
 
-    /// Returns true if a device has found the pairs.
     fn find_on_device(&mut self, all: &Boxes<'_>, request: &Request<'_>) -> Result<bool, Error> {
         let (Boxes { boxes, filters, .. }, Request { config, grouping, .. }) = (*all, *request);
         let (is_sorted, max_pairs) = (grouping.is_some(), config.limits.pairs());

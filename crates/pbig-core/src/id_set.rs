@@ -14,7 +14,6 @@ pub(crate) struct IdSet {
 }
 
 impl IdSet {
-    /// Returns the number of members.
     pub(crate) fn len(&self) -> usize {
         self.len
     }
@@ -57,7 +56,6 @@ impl IdSet {
         }
     }
 
-    /// Takes out a member.
     pub(crate) fn remove(&mut self, id: u32) {
         let word = id as usize / 64;
         self.len -= 1;
@@ -73,7 +71,6 @@ impl IdSet {
         words.flat_map(|word| ones(word as usize, self.bits[word as usize]))
     }
 
-    /// Gives back memory.
     pub(crate) fn shrink(&mut self) {
         self.bits.shrink_to_fit();
         self.words.shrink_to_fit();

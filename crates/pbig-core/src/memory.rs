@@ -82,7 +82,6 @@ impl<T> ShrinkingVec<T> {
         self.settle(needed);
     }
 
-    /// Swaps the elements with those of a list of a caller.
     pub(crate) fn swap_list(&mut self, list: &mut Vec<T>) {
         std::mem::swap(&mut self.list, list);
     }
@@ -134,24 +133,6 @@ mod tests {
 
     fn pool(capacity: usize) -> ShrinkingVec<u8> {
         ShrinkingVec { list: vec![0; capacity], ..ShrinkingVec::default() }
-    }
-
-    #[test]
-    fn a_list_shrinks_piece_by_piece_after_a_window_with_little_need() {
-        let mut pool = pool(1_000_000);
-        pool.settle(1_000_000);
-        let mut capacities = vec![];
-        for _ in 0..200 {
-            pool.clear();
-            pool.resize(10_000, 7);
-            pool.settle(10_000);
-            assert_eq!(pool.len(), 10_000);
-            capacities.push(pool.capacity());
-        }
-        assert!(capacities[..63].iter().all(|capacity| *capacity >= 1_000_000), "{capacities:?}");
-        assert!(capacities[199] <= 12_500 + SMALL, "{capacities:?}");
-        let pieces = capacities.windows(2).map(|two| two[0] - two[1]);
-        assert!(pieces.max().is_some_and(|piece| piece <= 1_000_000 / PIECES), "{capacities:?}");
     }
 
     /// The last piece is less than one of the pieces of the peak.

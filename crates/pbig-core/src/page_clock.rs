@@ -10,7 +10,6 @@ pub fn set_clock(now: fn() -> Duration) {
     let _ = NOW.set(now);
 }
 
-/// Returns true if the page has given a clock.
 pub(crate) fn is_set() -> bool {
     NOW.get().is_some()
 }

@@ -57,31 +57,17 @@ impl PairList {
     /// # Errors
     /// The index of a pair `(a, b)` that is not `a < b`, or that names no box. Then nothing was appended.
     pub fn append_checked(&mut self, pairs: &[Pair], ids: BoxIds<'_>) -> Result<(), usize> {
-        let copy = |at: usize, to: &mut [MaybeUninit<Pair>]| copy_into(to, &pairs[at..at + to.len()]);
-        // SAFETY: the function writes each element.
-        unsafe { self.append_by(pairs.len(), copy, ids) }
-    }
-
-    /// Appends `len` pairs, which `copy(at, to)` writes from the pair `at` on.
-    ///
-    /// # Safety
-    /// `copy` writes each element of `to`.
-    unsafe fn append_by(
-        &mut self,
-        len: usize,
-        copy: impl Fn(usize, &mut [MaybeUninit<Pair>]) + Sync,
-        ids: BoxIds<'_>,
-    ) -> Result<(), usize> {
+        let (start, len) = (self.pairs.len(), pairs.len());
         self.pairs.reserve(len);
-        let start = self.pairs.len();
-        let places = SharedSlice::new(&mut self.pairs.spare_capacity_mut()[..len]);
+        let room = SharedSlice::new(&mut self.pairs.spare_capacity_mut()[..len]);
         let checks = parallel::map(len.div_ceil(PIECE), |piece| {
-            let at = piece * PIECE;
-            // SAFETY: the place is inside the reserved memory, and no other piece has it. `copy` writes each element.
-            unsafe { write_piece(places.part(at..len.min(at + PIECE)), at, &copy, ids) }
+            let range = piece * PIECE..len.min((piece + 1) * PIECE);
+            // SAFETY: the range is inside the room, and no other piece has it.
+            let room = unsafe { room.part(range.clone()) };
+            copy_checked(room, &pairs[range.clone()], ids).map_err(|fault| range.start + fault)
         });
         let checks: Vec<Check> = checks.into_iter().collect::<Result<_, usize>>()?;
-        // SAFETY: as many pairs were reserved and written.
+        // SAFETY: each piece was copied.
         unsafe { self.pairs.set_len(start + len) };
         if self.checked.len == start {
             let is_in_order = |at: usize| at == 0 || self.pairs[at - 1] < self.pairs[at];
@@ -158,42 +144,18 @@ impl Check {
     }
 }
 
-/// Writes the pairs from `at` on, and checks them block by block.
-///
-/// # Safety
-/// `copy` writes each element.
-unsafe fn write_piece(
-    to: &mut [MaybeUninit<Pair>],
-    at: usize,
-    copy: impl Fn(usize, &mut [MaybeUninit<Pair>]),
-    ids: BoxIds<'_>,
-) -> Result<Check, usize> {
+/// Copies pairs, and checks each block of them while it is in the cache. Returns the index of a fault.
+fn copy_checked(to: &mut [MaybeUninit<Pair>], pairs: &[Pair], ids: BoxIds<'_>) -> Result<Check, usize> {
     let (mut all, mut last) = (Check::default(), None);
-    for block in to.chunks_mut(BLOCK) {
-        let first = at + all.len;
-        copy(first, block);
-        // SAFETY: the caller's promise.
-        let block = unsafe { written(block) };
-        let check = check_and_name(block, ids).map_err(|fault| first + fault)?;
+    for (room, pairs) in to.chunks_mut(BLOCK).zip(pairs.chunks(BLOCK)) {
+        room.iter_mut().zip(pairs).for_each(|(to, pair)| _ = to.write(*pair));
+        // SAFETY: each was written; a `MaybeUninit` has the layout of what it holds.
+        let block = unsafe { std::slice::from_raw_parts_mut(room.as_mut_ptr().cast::<Pair>(), room.len()) };
+        let check = check_and_name(block, ids).map_err(|fault| all.len + fault)?;
         all = all.before(check, last.as_ref() < block.first());
         last = block.last().copied();
     }
     Ok(all)
-}
-
-fn copy_into(to: &mut [MaybeUninit<Pair>], pairs: &[Pair]) {
-    for (place, pair) in to.iter_mut().zip(pairs) {
-        place.write(*pair);
-    }
-}
-
-/// Returns written elements.
-///
-/// # Safety
-/// Each was written.
-unsafe fn written(pairs: &mut [MaybeUninit<Pair>]) -> &mut [Pair] {
-    // SAFETY: the caller's promise; a `MaybeUninit` has the layout of what it holds.
-    unsafe { std::slice::from_raw_parts_mut(pairs.as_mut_ptr().cast(), pairs.len()) }
 }
 
 /// Checks pairs, and gives their boxes the ids of the request. Returns the index of a fault.
@@ -201,10 +163,9 @@ fn check_and_name(pairs: &mut [Pair], ids: BoxIds<'_>) -> Result<Check, usize> {
     let boxes = ids.boxes();
     let fault = |pairs: &[Pair]| pairs.iter().position(|pair| pair.a >= pair.b || pair.b >= boxes);
     let check = check_of(pairs).filter(|check| check.end <= boxes);
-    let (Some(check), BoxIds::Part(ids)) = (check, ids) else {
+    let (Some(_), BoxIds::Part(ids)) = (check, ids) else {
         return check.ok_or_else(|| fault(pairs).unwrap_or(0));
     };
-    debug_assert_eq!(check.len, pairs.len());
     pairs.iter_mut().for_each(|pair| *pair = Pair::new(ids[pair.a as usize], ids[pair.b as usize]));
     check_of(pairs).ok_or(0)
 }
@@ -222,7 +183,6 @@ fn check_of(pairs: &[Pair]) -> Option<Check> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::{AtomicU32, Ordering};
 
     /// Returns pairs in order, for some pieces and blocks and a few more.
     fn many() -> Vec<Pair> {
@@ -231,25 +191,6 @@ mod tests {
 
     fn end_of(pairs: &[Pair]) -> u32 {
         pairs.iter().map(|pair| pair.b + 1).max().unwrap_or(0)
-    }
-
-    #[test]
-    fn each_pair_is_read_once_where_it_lies() {
-        let pairs = many();
-        let reads: Vec<AtomicU32> = pairs.iter().map(|_| AtomicU32::new(0)).collect();
-        let copy = |at: usize, to: &mut [MaybeUninit<Pair>]| {
-            for (i, place) in to.iter_mut().enumerate() {
-                reads[at + i].fetch_add(1, Ordering::Relaxed);
-                place.write(pairs[at + i]);
-            }
-        };
-        let mut list = PairList::default();
-        // SAFETY: each element is written.
-        let appended = unsafe { list.append_by(pairs.len(), copy, BoxIds::First(end_of(&pairs))) };
-        assert_eq!((appended, &*list), (Ok(()), &pairs));
-        assert!(list.names_only(end_of(&pairs) as usize) && list.is_in_order());
-        assert!(!list.names_only(end_of(&pairs) as usize - 1));
-        assert!(reads.iter().all(|reads| reads.load(Ordering::Relaxed) == 1));
     }
 
     #[test]

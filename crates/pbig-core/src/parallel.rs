@@ -35,7 +35,6 @@ mod threads {
         if IS_ALONE.get() { 1 } else { rayon::current_num_threads() }
     }
 
-    /// Runs `take_pieces(worker)` on `workers` threads.
     pub(super) fn run_workers(workers: usize, take_pieces: impl Fn(usize) + Sync) {
         rayon::in_place_scope(|scope| {
             let take_pieces = &take_pieces;
@@ -207,7 +206,6 @@ pub(crate) fn split_into<T>(
     lens.into_iter().map(move |len| list.split_off_mut(..len).expect("parts lie in the list"))
 }
 
-/// Splits a list into equal pieces.
 pub(crate) fn split_evenly<T>(list: &mut [T], pieces: usize) -> impl Iterator<Item = &mut [T]> {
     let len = list.len();
     split_into(list, (0..pieces).map(move |piece| piece_range(len, piece, pieces).len()))
@@ -216,11 +214,7 @@ pub(crate) fn split_evenly<T>(list: &mut [T], pieces: usize) -> impl Iterator<It
 /// Returns `work(piece)` for each `piece < pieces`, in order.
 pub fn map<T: Send>(pieces: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let mut results: Vec<Option<T>> = std::iter::repeat_with(|| None).take(pieces).collect();
-    let shared = SharedSlice::new(&mut results);
-    run(threads_for(pieces), pieces, |_, piece| {
-        // SAFETY: each piece has a place of its own.
-        unsafe { shared.part(piece..piece + 1)[0] = Some(work(piece)) }
-    });
+    run_parts(threads_for(pieces), &mut results, |piece, result| *result = Some(work(piece)));
     results.into_iter().flatten().collect()
 }
 

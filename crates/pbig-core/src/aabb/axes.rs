@@ -3,7 +3,6 @@
 use super::Extremes;
 use crate::Aabb;
 
-/// See [`Aabb::overlaps`].
 #[inline(always)]
 pub(crate) fn overlaps(one: &Aabb, other: &Aabb) -> bool {
     let on_axis = |k: usize| (one.min[k] <= other.max[k]) & (other.min[k] <= one.max[k]);

@@ -15,7 +15,6 @@ use crate::{Algorithm, Checks, Engine, Pair, Plan};
 /// Work of a thread that it does not tell the others yet.
 const UNTOLD: u64 = 1024;
 
-/// The buffers of the look-ups.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LookUp {
     /// Changed boxes in the order of the tree: place and id.
@@ -71,7 +70,6 @@ impl LookUp {
         });
     }
 
-    /// Gathers the events of all threads.
     fn gather(&self, events: &mut Comparison, ids: usize) {
         events.clear();
         for thread in &self.threads {
@@ -82,7 +80,6 @@ impl LookUp {
         events.sort(ids);
     }
 
-    /// Gives back memory that the events of the last run did not need.
     pub(super) fn settle(&mut self) {
         for Thread { added, removed, dropped, .. } in &mut self.threads {
             [added, removed, dropped].into_iter().for_each(ShrinkingVec::settle_and_clear);

@@ -5,11 +5,10 @@ use super::Task;
 use super::world::World;
 use crate::pairs::{Grouping, Groups, Kept};
 use crate::policy;
-use crate::report::{Clock, Report, stage};
+use crate::report::{Clock, stage};
 use crate::search::{AllPairs, DeviceSlot, Request, Store};
-use crate::{Aabb, Algorithm, Boxes, Config, Error, Pair, ProxyFilter};
+use crate::{Aabb, Algorithm, Boxes, Error, Pair, ProxyFilter};
 
-/// The buffers of a search.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Search {
     store: Store,
@@ -36,10 +35,15 @@ impl Search {
         let all = Boxes { boxes, filters: world.is_filtered.then_some(&filters[..]), keys: None };
         let is_on_device = device.is_some();
         self.groups.may_repeat = is_on_device;
-        let parts = (&mut self.all_pairs, &mut self.store);
         task.report.work += (boxes.len() - world.present.len()) as u64;
-        if !search(parts, &all, task.config, device, task.report)? {
-            return Ok(false);
+        let grouping = Some(Grouping::new(boxes.len()));
+        if let Some(device) = device {
+            if !self.all_pairs.find_on(device, &all, task.config, grouping, task.report)? {
+                return Ok(false);
+            }
+        } else {
+            let request = Request { grouping, is_repeated: true, ..Request::of_one(&all, task.config) };
+            self.all_pairs.find(&request, &mut self.store, task.report)?;
         }
         if self.store.has_tree && !is_on_device && !is_listed {
             task.tree.adopt(&mut self.store.tree);
@@ -56,14 +60,12 @@ impl Search {
         (0..4).for_each(|_| self.store.note_given_up());
     }
 
-    /// Gives memory back if as many pairs are expected.
     pub(super) fn settle(&mut self, pairs: usize) {
         self.store.settle();
         self.all_pairs.settle(pairs);
         self.groups.settle(pairs);
     }
 
-    /// Compares the found pairs with the kept ones.
     fn compare(&mut self, task: &mut Task<'_>, is_on_device: bool, is_listed: bool) {
         stage!("diff");
         let algorithm = task.report.plan.algorithm;
@@ -88,24 +90,6 @@ impl Search {
             self.groups.rename_partners(names);
         }
         task.events.run((&mut self.groups, names), task.kept, AllPairs::workers(boxes));
-    }
-}
-
-/// Leaves the pairs of all boxes in `all_pairs`. Returns false if a device could not find them.
-fn search(
-    (all_pairs, store): (&mut AllPairs, &mut Store),
-    all: &Boxes<'_>,
-    config: &Config,
-    device: Option<&mut DeviceSlot>,
-    report: &mut Report,
-) -> Result<bool, Error> {
-    let grouping = Some(Grouping::new(all.boxes.len()));
-    match device {
-        Some(device) => all_pairs.find_on(device, all, config, grouping, report),
-        None => {
-            let request = Request { grouping, is_repeated: true, ..Request::of_one(all, config) };
-            all_pairs.find(&request, store, report).map(|()| true)
-        }
     }
 }
 

@@ -17,27 +17,21 @@ fn to_bits(aabb: &Aabb) -> Bits {
     bytemuck::cast(*aabb)
 }
 
-/// The first field, read before all others.
-#[derive(Serialize)]
-struct Version(u32);
-
-impl<'de> Deserialize<'de> for Version {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let version = u32::deserialize(deserializer)?;
-        if version == VERSION {
-            return Ok(Self(version));
-        }
-        let why = format!(
-            "snapshot: format {version}, but this pbig-core reads format {VERSION}; save the world anew"
-        );
-        Err(D::Error::custom(why))
+/// Reads the version, before all other fields.
+fn version<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    match u32::deserialize(deserializer)? {
+        VERSION => Ok(VERSION),
+        other => Err(D::Error::custom(format!(
+            "snapshot: format {other}, but this pbig-core reads format {VERSION}; save the world anew"
+        ))),
     }
 }
 
 /// All lists are by id or sorted, so that equal states have equal bytes.
 #[derive(Serialize, Deserialize)]
 struct Snapshot {
-    version: Version,
+    #[serde(deserialize_with = "version")]
+    version: u32,
     margin: f32,
     backend: Backend,
     order: Order,
@@ -58,7 +52,7 @@ impl Serialize for BroadPhase {
         let filter = |id: u32| self.filter(id).copied().unwrap_or_default();
         let ids = world.ids() as u32;
         Snapshot {
-            version: Version(VERSION),
+            version: VERSION,
             margin: self.config.margin,
             backend: self.config.backend,
             order: self.config.order,
@@ -93,7 +87,8 @@ impl Snapshot {
         // Only the changes of the snapshot count, not these insertions. Saved pairs are trusted, as those of an update are.
         world.forget_changes();
         self.changed.iter().for_each(|&id| world.note_change(id));
-        restored.kept.replace(&self.pairs, self.boxes.len());
+        restored.kept.reserve_ids(self.boxes.len());
+        restored.kept.apply(&self.pairs, &[]);
         Ok(restored)
     }
 

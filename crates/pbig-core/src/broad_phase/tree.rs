@@ -27,11 +27,8 @@ struct Fresh {
     sorted: OnceLock<BoxIndex>,
     /// Held by the query that sorts. The others go on with the tree as it is.
     sorting: Mutex<()>,
-    /// The empty list of changes, for its memory.
-    no_changes: Vec<u32>,
 }
 
-/// A tree of boxes as they were.
 #[derive(Debug, Default)]
 struct Stale {
     index: BoxIndex,
@@ -49,7 +46,6 @@ impl Clone for Tree {
 }
 
 impl Tree {
-    /// Says that a box is about to change.
     #[inline(always)]
     pub(super) fn expire(&mut self) {
         if self.fresh.get_mut().is_some() {
@@ -59,9 +55,9 @@ impl Tree {
 
     #[cold]
     fn make_stale(&mut self) {
-        if let Some(Fresh { index, sorted, no_changes: changed, .. }) = self.fresh.take() {
-            let index = sorted.into_inner().unwrap_or(index);
-            *self.stale_mut() = Stale { index, changed, knows_changes: true };
+        if let Some(Fresh { index, sorted, .. }) = self.fresh.take() {
+            let stale = self.stale_mut();
+            (stale.index, stale.knows_changes) = (sorted.into_inner().unwrap_or(index), true);
         }
     }
 
@@ -77,7 +73,7 @@ impl Tree {
             return;
         }
         if is_read {
-            self.fresh = self.refreshed(world).into();
+            self.fresh = self.stale_mut().refreshed(world, false).0.into();
             return;
         }
         let stale = self.stale_mut();
@@ -103,14 +99,9 @@ impl Tree {
         if index.wants_sort() { fresh.sort(world) } else { index }
     }
 
-    /// Takes the stale tree, and brings it up to date.
     #[cold]
     fn refreshed(&self, world: &World) -> Fresh {
-        let stale = std::mem::take(&mut *self.stale.lock().unwrap_or_else(PoisonError::into_inner));
-        let Stale { mut index, mut changed, knows_changes } = stale;
-        changed.extend_from_slice(&world.changed);
-        index.refresh_present(&world.boxes, knows_changes.then_some(&changed), world.present.iter());
-        Fresh::new(index, changed)
+        self.stale.lock().unwrap_or_else(PoisonError::into_inner).refreshed(world, false).0
     }
 
     /// Returns how many of the changed boxes need new places in the tree. If it does not know what has changed, all are read anyway.
@@ -126,11 +117,7 @@ impl Tree {
     /// Makes the tree fresh, with its boxes sorted, for look-ups of the changed ones. Returns it, and how many boxes were read.
     pub(super) fn refresh_sorted(&mut self, world: &World) -> (&BoxIndex, usize) {
         self.make_stale();
-        let Stale { mut index, mut changed, knows_changes } = std::mem::take(self.stale_mut());
-        changed.extend_from_slice(&world.changed);
-        let known = knows_changes.then_some(&changed[..]);
-        let read = index.refresh_sorted(&world.boxes, known, world.present.iter());
-        let fresh = Fresh::new(index, changed);
+        let (fresh, read) = self.stale_mut().refreshed(world, true);
         (&self.fresh.get_or_init(|| fresh).index, read)
     }
 
@@ -144,17 +131,37 @@ impl Tree {
     /// Takes over a tree that was sorted just now from all boxes. The one so far is left in its place, for its memory.
     pub(super) fn adopt(&mut self, sorted: &mut BoxIndex) {
         self.make_stale();
-        let Stale { index, changed, .. } = std::mem::take(self.stale_mut());
-        self.fresh = Fresh::new(std::mem::replace(sorted, index), changed).into();
+        let index = std::mem::replace(sorted, self.stale_mut().take());
+        self.fresh = Fresh { index, ..Fresh::default() }.into();
+    }
+}
+
+impl Stale {
+    /// Takes the tree, and forgets what has changed since.
+    fn take(&mut self) -> BoxIndex {
+        self.changed.clear();
+        self.knows_changes = false;
+        std::mem::take(&mut self.index)
+    }
+
+    /// Takes the tree, and brings it up to date, if need be with its boxes sorted. Returns how many boxes were read, too.
+    fn refreshed(&mut self, world: &World, is_sorted: bool) -> (Fresh, usize) {
+        let mut changed = std::mem::take(&mut self.changed);
+        changed.extend_from_slice(&world.changed);
+        let known = self.knows_changes.then_some(&changed[..]);
+        let (mut index, present) = (self.take(), world.present.iter());
+        let read = if is_sorted {
+            index.refresh_sorted(&world.boxes, known, present)
+        } else {
+            index.refresh_present(&world.boxes, known, present)
+        };
+        changed.clear();
+        self.changed = changed;
+        (Fresh { index, ..Fresh::default() }, read)
     }
 }
 
 impl Fresh {
-    fn new(index: BoxIndex, mut changes: Vec<u32>) -> Self {
-        changes.clear();
-        Self { index, no_changes: changes, ..Self::default() }
-    }
-
     /// Sorts the boxes for this and later queries, unless another query does it just now. Both orders are held until the boxes change.
     #[cold]
     fn sort(&self, world: &World) -> &BoxIndex {

@@ -129,7 +129,6 @@ impl BroadPhase {
         self.kept.settle(events);
     }
 
-    /// Begins an empty report.
     fn begin_report(&mut self) {
         let present = self.world.present.len() as u64;
         let report = &mut self.report;

@@ -23,7 +23,6 @@ mod state {
     pub(super) const CHANGED: u8 = 4;
 }
 
-/// Boxes by id.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct World {
     /// Fat boxes; [`Aabb::NOWHERE`] for absent and invalid ones.
@@ -60,18 +59,15 @@ impl World {
         self.states[id as usize] & state::REMOVED != 0
     }
 
-    /// Returns true if any box was removed since the last update.
     pub(super) fn has_removed(&self) -> bool {
         !self.removed.is_empty()
     }
 
-    /// Returns true if a box has changed since the last update.
     #[inline(always)]
     pub(super) fn has_changed(&self, id: u32) -> bool {
         self.states[id as usize] & state::CHANGED != 0
     }
 
-    /// Makes ids below `ids` known.
     pub(super) fn reserve_ids(&mut self, ids: usize) {
         self.boxes.resize(ids, Aabb::NOWHERE);
         self.filters.resize(ids, ProxyFilter::ALL);
@@ -79,7 +75,6 @@ impl World {
         self.present.reserve(ids);
     }
 
-    /// Returns all boxes.
     #[inline(always)]
     fn all(&mut self) -> Part<'_> {
         let Self { boxes, filters, states, changed, valid, is_filtered, .. } = self;
@@ -154,7 +149,6 @@ impl World {
         Some(absent)
     }
 
-    /// Takes what threads have noted.
     fn take_moved(&mut self, moved: Vec<Moved>) -> Vec<(u32, Aabb, ProxyFilter)> {
         let mut all_absent = Vec::new();
         for Moved { changed, valid, is_filtered, is_noted, absent } in moved {
@@ -170,7 +164,6 @@ impl World {
         all_absent
     }
 
-    /// Notes a change of a box.
     #[cfg(feature = "serde")]
     pub(super) fn note_change(&mut self, id: u32) {
         self.change(|all| all.note_change(id));
@@ -193,7 +186,6 @@ impl World {
         });
     }
 
-    /// Removes a box that is present.
     pub(super) fn remove(&mut self, id: u32) {
         self.change(|all| {
             all.note_change(id);
@@ -315,7 +307,6 @@ impl Part<'_> {
         *self.valid = self.valid.wrapping_add(u32::from(is_valid)).wrapping_sub(u32::from(was_valid));
     }
 
-    /// Notes a change of a box.
     #[inline(always)]
     fn note_change(&mut self, id: u32) {
         self.is_noted = true;

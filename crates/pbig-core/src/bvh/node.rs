@@ -63,7 +63,6 @@ impl Node {
         (0..3).map(|k| below(k) + above(k)).sum()
     }
 
-    /// Returns true if a lane has a box.
     #[inline(always)]
     pub(crate) fn has(&self, lane: usize) -> bool {
         self.boxes[0][lane] <= self.boxes[3][lane]

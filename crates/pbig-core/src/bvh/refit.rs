@@ -193,7 +193,6 @@ impl BoxIndex {
         self.lay_out(boxes, 0..boxes.len() as u32, Some(Order { split, ..Order::SORTED }));
     }
 
-    /// Reads all boxes.
     fn refit(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32> + Clone) {
         if self.end == 0 {
             return self.lay_out(boxes, present, None);

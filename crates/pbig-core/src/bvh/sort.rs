@@ -16,7 +16,6 @@ const MAX_SAMPLED: usize = 64;
 /// Minimum number of sampled boxes around a part that tell which are around its halves.
 const MIN_SAMPLED: usize = 16;
 
-/// The order of the boxes in a tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Order {
     /// The first id of the second of two sets: no leaf has boxes of both. Above all ids if there is one set.
@@ -167,7 +166,6 @@ struct Sampled {
 }
 
 impl Sampled {
-    /// Yields some boxes of a class.
     fn of(class: &[Entry]) -> impl Iterator<Item = Self> {
         let step = class.len().div_ceil(MAX_SAMPLED);
         let boxes = class.len() as f64 / class.len().div_ceil(step) as f64;

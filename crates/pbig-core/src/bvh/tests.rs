@@ -1,8 +1,6 @@
 //! The index gives the answers of a scan of all boxes, after all kinds of changes, and looks at few boxes.
 
-use super::query::Cast;
-use super::{BoxIndex, walk};
-use super::{LANES, NONE};
+use super::{BoxIndex, LANES, NONE};
 use crate::simd::{Portable, Simd};
 use crate::{Aabb, Config, Engine, Finder};
 use rand::rngs::StdRng;
@@ -52,36 +50,6 @@ fn met(index: &BoxIndex, start: &Aabb, velocity: [f32; 3], max_time: f32) -> Vec
     found
 }
 
-/// Returns the ids that a walk visits.
-fn visited(walk: impl FnOnce(&mut dyn FnMut(u32)) -> u64) -> Vec<u32> {
-    let mut ids = vec![];
-    walk(&mut |id| ids.push(id));
-    ids
-}
-
-/// With portable instructions queries of each kind visit the same boxes in the same order as with the best ones.
-fn check_portable(index: &BoxIndex, start: &Aabb, velocity: [f32; 3], (time, within): (f32, f32)) {
-    // After a visit less is wanted.
-    let bounded = |visit: &mut dyn FnMut(u32), id: u32, bound: f32| {
-        visit(id);
-        0.5 * bound
-    };
-    let cast = Cast::new(start, velocity, time).expect("numbers");
-    assert_eq!(
-        visited(|visit| index.cast_aabb(start, velocity, time, |id| bounded(visit, id, time))),
-        visited(|visit| walk::cast(Portable, index, (cast, time), |id| bounded(visit, id, time))),
-    );
-    let point = start.min;
-    assert_eq!(
-        visited(|visit| index.near(point, within, |id| bounded(visit, id, within))),
-        visited(|visit| walk::near(Portable, index, (point, within), |id| bounded(visit, id, within))),
-    );
-    assert_eq!(
-        visited(|visit| index.overlapping(start, visit)),
-        visited(|visit| walk::overlapping(Portable, index, start, visit)),
-    );
-}
-
 /// Asks one query of each kind, and compares with a scan.
 fn check(index: &BoxIndex, boxes: &[Aabb], rng: &mut StdRng, reach: f32) {
     let start = Aabb::from_center(
@@ -114,7 +82,6 @@ fn check(index: &BoxIndex, boxes: &[Aabb], rng: &mut StdRng, reach: f32) {
     });
     let is_near = |i: usize, factor: f64| distance(point, &boxes[i]) <= f64::from(within) * factor;
     compare(found, (0..boxes.len()).filter(|&i| is_near(i, 1.0)), |i| is_near(i, 1.001));
-    check_portable(index, &start, velocity, (max_time, within));
 }
 
 /// Each box has one place, each node's bounds are around its boxes, and free lanes are counted.

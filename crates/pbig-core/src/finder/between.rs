@@ -45,6 +45,22 @@ impl Finder {
         bytemuck::cast_slice(&self.pairs_between)
     }
 
+    /// Calls `visit` once for every pair of a box of `a` with a box of `b` that overlap, as [`Finder::for_each_pair`] does for one
+    /// set. See [`Finder::find_between`] for the sets. Returns the number of pairs.
+    ///
+    /// # Errors
+    /// The errors of [`Finder::for_each_pair`].
+    pub fn for_each_pair_between<'a>(
+        &mut self,
+        a: impl Into<Boxes<'a>>,
+        b: impl Into<Boxes<'a>>,
+        visit: impl Fn(CrossPair) + Sync,
+    ) -> Result<u64, Error> {
+        let each = |pairs: &[Pair], sets: &Sets| pairs.iter().for_each(|pair| visit(sets.named(pair)));
+        self.search_between(&a.into(), &b.into(), Some(&each))?;
+        Ok(self.report.pairs)
+    }
+
     /// Finds the pairs of two sets, for a receiver or as a list.
     pub(super) fn search_between(
         &mut self,
@@ -69,7 +85,7 @@ impl Finder {
             keys: sets.keys([a, b]),
             receiver,
             grouping,
-            ..Request::new(first, &self.config)
+            ..Request::of_one(&Boxes::new(first), &self.config)
         };
         let done = self.all_pairs.find(&request, &mut self.store, &mut self.report);
         self.count_invalid();
@@ -77,20 +93,15 @@ impl Finder {
         done?;
         self.report.pairs = self.all_pairs.count();
         if visit.is_none() {
-            self.emit_between(grouping);
+            // The pairs of the last search of one set stay.
+            std::mem::swap(&mut self.pairs, &mut self.pairs_between);
+            self.emit(grouping);
+            std::mem::swap(&mut self.pairs, &mut self.pairs_between);
+            self.name_ids();
         }
         Ok(())
     }
 
-    /// Lists the pairs of two sets. The pairs of the last search of one set stay.
-    fn emit_between(&mut self, grouping: Option<Grouping>) {
-        std::mem::swap(&mut self.pairs, &mut self.pairs_between);
-        self.emit(grouping);
-        std::mem::swap(&mut self.pairs, &mut self.pairs_between);
-        self.name_ids();
-    }
-
-    /// Turns the places of a search into ids.
     fn name_ids(&mut self) {
         stage!("emit");
         let mut clock = Clock::start();

@@ -1,11 +1,10 @@
 //! The boxes of two sets that may have pairs: without those that miss all of the other set, if these are many.
 
-use crate::parallel::{ensure_scratch, map, piece_range, run_parts, split_evenly, threads_for};
+use crate::parallel::{ensure_scratch, map, piece_range, run_parts, threads_for};
 use crate::policy::{FEW_BOXES, PARALLEL_FROM_BOXES};
 use crate::search::ById;
 use crate::search::grid::bounds::{bounds_of, spread_evenly};
 use crate::{Aabb, Boxes, CrossPair, Keys, NO_KEY, Pair, ProxyFilter};
-use std::ops::Range;
 
 /// Boxes that a thread looks at together: they stay in its second cache.
 const PIECE: usize = 1 << 13;
@@ -27,7 +26,7 @@ pub(super) struct Sets {
 /// Copies of what is known about the boxes of a set that are left.
 #[derive(Clone, Debug, Default)]
 struct Copies {
-    /// The number of places. Only so many boxes and ids are in use, and these only if the set is copied.
+    /// The number of places. Only so many boxes are in use, and these only if the set is copied.
     len: usize,
     boxes: Vec<Aabb>,
     /// By place: the id in the set.
@@ -43,13 +42,14 @@ impl Sets {
         // A few boxes are tested against the others sooner than these are looked at.
         self.are_copied = a.len().min(b.len()) > FEW_BOXES && !are_near(a, b);
         self.dropped = 0;
-        let lens = if self.are_copied { self.copy_near(a, b) } else { [a.len(), b.len()] };
-        self.copies.iter_mut().zip(lens).for_each(|(copies, len)| copies.len = len);
+        self.copies.iter_mut().zip(sets).for_each(|(copies, set)| copies.len = set.boxes.len());
+        if self.are_copied {
+            self.copy_near(a, b);
+        }
         self.fill(sets.map(|set| set.filters), |copy| &mut copy.filters, ProxyFilter::ALL);
         self.fill(sets.map(|set| set.keys), |copy| &mut copy.keys, [NO_KEY; 4]);
     }
 
-    /// Returns the boxes that are left of both sets.
     pub(super) fn boxes<'a>(&'a self, sets: [&Boxes<'a>; 2]) -> [&'a [Aabb]; 2] {
         let [one, other] = &self.copies;
         if self.are_copied {
@@ -107,7 +107,7 @@ impl Sets {
             values.clear();
             match given {
                 Some(given) if self.are_copied => {
-                    values.extend(copy.ids[..copy.len].iter().map(|id| given[*id as usize]));
+                    values.extend(copy.ids.iter().map(|id| given[*id as usize]));
                 }
                 Some(_) => {}
                 None => values.resize(copy.len, default),
@@ -117,20 +117,37 @@ impl Sets {
     }
 
     /// Copies the valid boxes of each set that overlap the bounds of the other set. Drops more of them while more than a quarter of
-    /// the boxes is dropped, because the bounds of the boxes that are left are smaller. Returns how many are left.
-    fn copy_near(&mut self, a: &[Aabb], b: &[Aabb]) -> [usize; 2] {
-        let [first, second] = &mut self.copies;
-        let (mut first, mut second) = (Side::new(first, a.len()), Side::new(second, b.len()));
-        let valid = first.take(a, &bounds_of_valid(b)) + second.take(b, &first.bounds);
-        let (mut before, mut left) = (a.len() + b.len(), first.len + second.len);
+    /// the boxes is dropped, because the bounds of the boxes that are left are smaller.
+    fn copy_near(&mut self, a: &[Aabb], b: &[Aabb]) {
+        let mut first = Near::of(a, None, &bounds_of_valid(b));
+        let mut second = Near::of(b, None, &first.bounds);
+        let valid = first.valid + second.valid;
+        let (mut before, mut left) = (a.len() + b.len(), first.ids.len() + second.ids.len());
         while 4 * left < 3 * before {
-            first.keep_near(&second.bounds);
-            second.keep_near(&first.bounds);
-            (before, left) = (left, first.len + second.len);
+            first = Near::of(a, Some(&first.ids), &second.bounds);
+            second = Near::of(b, Some(&second.ids), &first.bounds);
+            (before, left) = (left, first.ids.len() + second.ids.len());
         }
-        let lens = if first.len.min(second.len) == 0 { [0, 0] } else { [first.len, second.len] };
-        self.dropped = valid - (lens[0] + lens[1]) as u64;
-        lens
+        if first.ids.is_empty() || second.ids.is_empty() {
+            first.ids.clear();
+            second.ids.clear();
+        }
+        self.dropped = valid - (first.ids.len() + second.ids.len()) as u64;
+        let [copies, other_copies] = &mut self.copies;
+        copies.take(a, first.ids);
+        other_copies.take(b, second.ids);
+    }
+}
+
+impl Copies {
+    /// Copies some boxes of a set.
+    fn take(&mut self, set: &[Aabb], ids: Vec<u32>) {
+        (self.len, self.ids) = (ids.len(), ids);
+        ensure_scratch(&mut self.boxes, self.len, Aabb::NOWHERE);
+        let parts = self.boxes[..self.len].chunks_mut(PIECE).zip(self.ids.chunks(PIECE));
+        run_parts(threads_for(self.len.div_ceil(PIECE)), parts, |_, (boxes, ids)| {
+            boxes.iter_mut().zip(ids).for_each(|(to, id)| *to = set[*id as usize]);
+        });
     }
 }
 
@@ -144,82 +161,49 @@ fn seem_near(set: &[Aabb], near: &Aabb) -> bool {
     spread_evenly(set.len(), SAMPLE).all(|i| set[i].is_valid() && set[i].overlaps(near))
 }
 
-/// The boxes of one set that are left, with their ids, and the bounds of these boxes.
-struct Side<'a> {
-    boxes: &'a mut [Aabb],
-    ids: &'a mut [u32],
-    len: usize,
+/// The valid boxes of a set that overlap a box.
+struct Near {
+    ids: Vec<u32>,
     bounds: Aabb,
-}
-
-impl<'a> Side<'a> {
-    fn new(copy: &'a mut Copies, len: usize) -> Self {
-        ensure_scratch(&mut copy.boxes, len, Aabb::NOWHERE);
-        ensure_scratch(&mut copy.ids, len, 0);
-        Self { boxes: &mut copy.boxes, ids: &mut copy.ids, len, bounds: Aabb::NOWHERE }
-    }
-
-    /// Takes the valid boxes of a set that overlap a box. Returns how many are valid.
-    fn take(&mut self, set: &[Aabb], near: &Aabb) -> u64 {
-        self.keep(near, |boxes, ids, range| {
-            boxes.copy_from_slice(&set[range.clone()]);
-            ids.iter_mut().zip(range.start as u32..).for_each(|(id, i)| *id = i);
-        })
-    }
-
-    /// Drops boxes that miss a box.
-    fn keep_near(&mut self, near: &Aabb) {
-        self.keep(near, |_, _, _| ());
-    }
-
-    /// Keeps the valid boxes that overlap a box, of what `fill` puts into each piece. Returns how many are valid.
-    fn keep(&mut self, near: &Aabb, fill: impl Fn(&mut [Aabb], &mut [u32], Range<usize>) + Sync) -> u64 {
-        let (len, pieces) = (self.len, pieces(self.len));
-        let mut kept = vec![Kept::NONE; pieces];
-        let boxes = split_evenly(&mut self.boxes[..len], pieces);
-        let parts = boxes.zip(split_evenly(&mut self.ids[..len], pieces)).zip(&mut kept);
-        run_parts(threads_for(pieces), parts, |piece, ((boxes, ids), kept)| {
-            fill(boxes, ids, piece_range(len, piece, pieces));
-            *kept = keep_in_piece(boxes, ids, near);
-        });
-        self.close_gaps(&kept);
-        self.bounds = bounds_of(kept.iter().map(|kept| &kept.bounds));
-        kept.iter().map(|kept| kept.valid).sum()
-    }
-
-    /// Moves what is left of each piece to the end of the one before.
-    fn close_gaps(&mut self, pieces: &[Kept]) {
-        let (len, mut end) = (self.len, 0);
-        for (piece, kept) in pieces.iter().enumerate() {
-            let first = piece_range(len, piece, pieces.len()).start;
-            if first > end {
-                self.boxes.copy_within(first..first + kept.len, end);
-                self.ids.copy_within(first..first + kept.len, end);
-            }
-            end += kept.len;
-        }
-        self.len = end;
-    }
-}
-
-/// A piece after its boxes have been dropped: the number and bounds of the others, and how many were valid before.
-#[derive(Clone, Copy)]
-struct Kept {
-    len: usize,
+    /// The number of boxes that are valid, near or not.
     valid: u64,
-    bounds: Aabb,
 }
 
-impl Kept {
-    const NONE: Self = Self { len: 0, valid: 0, bounds: Aabb::NOWHERE };
+impl Near {
+    /// Finds those of all boxes of a set, or of the named ones, that overlap a box.
+    fn of(set: &[Aabb], named: Option<&[u32]>, near: &Aabb) -> Self {
+        let len = named.map_or(set.len(), <[u32]>::len);
+        let pieces = pieces(len);
+        let parts = map(pieces, |piece| {
+            let places = piece_range(len, piece, pieces);
+            match named {
+                Some(ids) => Self::among(set, ids[places].iter().copied(), near),
+                None => Self::among(set, places.start as u32..places.end as u32, near),
+            }
+        });
+        let ids: Vec<&[u32]> = parts.iter().map(|part| &part.ids[..]).collect();
+        let bounds = bounds_of(parts.iter().map(|part| &part.bounds));
+        Self { ids: ids.concat(), bounds, valid: parts.iter().map(|part| part.valid).sum() }
+    }
+
+    fn among(set: &[Aabb], named: impl ExactSizeIterator<Item = u32>, near: &Aabb) -> Self {
+        let (mut ids, mut len, mut valid) = (vec![0; named.len()], 0, 0);
+        for id in named {
+            // Without a branch: each id is written, and the next one overwrites it unless its box is near.
+            let aabb = &set[id as usize];
+            ids[len] = id;
+            valid += u64::from(aabb.is_valid());
+            len += usize::from(aabb.is_valid() & aabb.overlaps(near));
+        }
+        ids.truncate(len);
+        Self { bounds: bounds_of(ids.iter().map(|id| &set[*id as usize])), ids, valid }
+    }
 }
 
-/// Returns the number of pieces of some boxes.
 fn pieces(boxes: usize) -> usize {
     if boxes < PARALLEL_FROM_BOXES { 1 } else { boxes.div_ceil(PIECE) }
 }
 
-/// Returns the bounds of the valid ones of some boxes.
 fn bounds_of_valid(boxes: &[Aabb]) -> Aabb {
     let pieces = pieces(boxes.len());
     let bounds = map(pieces, |piece| {
@@ -227,17 +211,4 @@ fn bounds_of_valid(boxes: &[Aabb]) -> Aabb {
         bounds_of(boxes.iter().filter(|aabb| aabb.is_valid()))
     });
     bounds_of(&bounds)
-}
-
-/// Moves valid boxes that overlap a box to the front.
-fn keep_in_piece(boxes: &mut [Aabb], ids: &mut [u32], near: &Aabb) -> Kept {
-    let (mut len, mut valid) = (0, 0);
-    for i in 0..boxes.len() {
-        // Tested where it lies: a copy that was just written would be slow to read.
-        let (is_valid, is_near) = (boxes[i].is_valid(), boxes[i].overlaps(near));
-        (boxes[len], ids[len]) = (boxes[i], ids[i]);
-        valid += u64::from(is_valid);
-        len += usize::from(is_valid & is_near);
-    }
-    Kept { len, valid, bounds: bounds_of(&boxes[..len]) }
 }

@@ -5,9 +5,11 @@ use super::kept::{Kept, Rows};
 use super::row::{self, equal};
 use crate::Pair;
 use crate::memory::ShrinkingVec;
-use crate::parallel::{run_parts_with, split_into};
+use crate::parallel::{ensure_scratch, run_parts_with, split_into};
 use crate::simd::{Simd, dispatch};
-use std::ops::Range;
+
+/// Bits of `a` by which many events are sorted roughly before each part is sorted.
+const RADIX_BITS: u32 = 11;
 
 /// The result of a comparison. `added` and `removed` are sorted.
 #[derive(Clone, Debug, Default)]
@@ -25,7 +27,6 @@ pub(crate) struct Comparison {
     counts: Vec<u32>,
 }
 
-/// The events of one group.
 #[derive(Clone, Debug, Default)]
 struct Part {
     added: ShrinkingVec<Pair>,
@@ -101,7 +102,6 @@ impl Comparison {
         lists.into_iter().for_each(|list| list.settle(events));
     }
 
-    /// Forgets all events.
     pub(crate) fn clear(&mut self) {
         self.added.clear();
         self.removed.clear();
@@ -109,11 +109,10 @@ impl Comparison {
         self.is_kept = false;
     }
 
-    /// Sorts events that were found in any order.
     pub(crate) fn sort(&mut self, ids: usize) {
         let Self { added, removed, dropped, sorted, counts, .. } = self;
         for events in [added, removed, dropped] {
-            groups::sort(events, sorted, counts, ids);
+            sort(events, sorted, counts, ids);
         }
     }
 
@@ -141,29 +140,71 @@ struct NewRows<'a> {
     pool: &'a [u32],
 }
 
-impl NewRows<'_> {
-    /// Yields each id with the place of its row in the pool of the group.
-    #[inline(always)]
-    fn rows(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
-        let name = |place: u32| self.names.map_or(place, |names| names[place as usize]);
-        self.spans.iter().zip(self.first_id..).map(move |(span, place)| (name(place), self.range(*span)))
-    }
-
-    /// Returns the place of a row in the pool of the group.
-    #[inline(always)]
-    fn range(&self, span: Span) -> Range<usize> {
-        let start = (span.start - self.first_place) as usize;
-        start..start + span.len as usize
-    }
-}
-
 impl Part {
     /// Compares rows, most of which are short and have not changed.
     #[inline(always)]
     fn compare(simd: impl Simd, part: &mut Self, old: &Rows, new: &NewRows<'_>) {
-        for (a, is) in new.rows() {
-            let was = old.spans[a as usize].range();
+        for (place, span) in (new.first_id..).zip(new.spans) {
+            let a = new.names.map_or(place, |names| names[place as usize]);
+            let start = (span.start - new.first_place) as usize;
+            let (was, is) = (old.spans[a as usize].range(), start..start + span.len as usize);
             row::compare(simd, a, (&old.pool, was), (new.pool, is), (&mut part.added, &mut part.removed));
+        }
+    }
+}
+
+/// Sorts pairs by the highest bits of `a`, into `to`.
+fn sort_roughly(pairs: &[Pair], to: &mut Vec<Pair>, counts: &mut Vec<u32>, ids: usize) {
+    let shift = (usize::BITS - ids.leading_zeros()).saturating_sub(RADIX_BITS);
+    ensure_scratch(to, pairs.len(), Pair::default());
+    counts.clear();
+    counts.resize(1 << RADIX_BITS, 0);
+    pairs.iter().for_each(|pair| counts[(pair.a >> shift) as usize] += 1);
+    let mut next = 0;
+    for count in counts.iter_mut() {
+        next += std::mem::replace(count, next);
+    }
+    for pair in pairs {
+        let place = &mut counts[(pair.a >> shift) as usize];
+        to[*place as usize] = *pair;
+        *place += 1;
+    }
+}
+
+/// Sorts pairs: roughly by `a` first if they are many.
+fn sort(pairs: &mut ShrinkingVec<Pair>, sorted: &mut ShrinkingVec<Pair>, counts: &mut Vec<u32>, ids: usize) {
+    let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
+    if pairs.len() < 1 << RADIX_BITS {
+        return pairs.sort_unstable_by_key(word);
+    }
+    sort_roughly(pairs, sorted, counts, ids);
+    sorted.truncate(pairs.len());
+    std::mem::swap(pairs, sorted);
+    let mut start = 0;
+    for &end in &*counts {
+        pairs[start..end as usize].sort_unstable_by_key(word);
+        start = end as usize;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_events_are_sorted_whatever_the_number_of_ids() {
+        let (mut sorted, mut counts) = (ShrinkingVec::default(), vec![]);
+        for ids in [2047, 2048, 2049, (1 << 20) - 1, 1 << 20, (1 << 20) + 1] {
+            for len in [0, 10, 2047, 2048, 5000] {
+                let id = |i: u64| (i * 0x9E37_79B9 % ids) as u32;
+                let mut pairs = ShrinkingVec::default();
+                pairs.extend((0..len).map(|i| Pair::new(id(i), id(i + len))));
+                pairs.push(Pair { a: ids as u32 - 2, b: ids as u32 - 1 });
+                let mut wanted = pairs.to_vec();
+                wanted.sort_unstable();
+                sort(&mut pairs, &mut sorted, &mut counts, ids as usize);
+                assert_eq!(*pairs, wanted, "{len} pairs of {ids} ids");
+            }
         }
     }
 }

@@ -1,6 +1,5 @@
 //! Groups: found pairs gathered by ranges of `a`, so that each group is sorted within the cache, by any thread.
 
-use super::Found;
 use super::row::{self, SHORT};
 use crate::Pair;
 use crate::id_set::IdSet;
@@ -15,9 +14,6 @@ const SHIFTS: RangeInclusive<u32> = 10..=14;
 /// Approximate number of groups, up to 650,000 ids: their write positions fit the TLB.
 const MAX_GROUPS: usize = 40;
 
-/// Bits of `a` by which many events are sorted roughly before each part is sorted.
-const RADIX_BITS: u32 = 11;
-
 /// Division of ids into groups.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Grouping {
@@ -27,14 +23,12 @@ pub(crate) struct Grouping {
 }
 
 impl Grouping {
-    /// Returns the groups of `ids` ids.
     pub(crate) fn new(ids: usize) -> Self {
         let mut shifts = SHIFTS;
         let shift = shifts.find(|shift| ids >> shift <= MAX_GROUPS).unwrap_or(*SHIFTS.end());
         Self { ids, shift, count: (ids >> shift) + 1 }
     }
 
-    /// Returns the ids of a group.
     pub(super) fn ids_of(&self, group: usize) -> Range<usize> {
         group << self.shift..((group + 1) << self.shift).min(self.ids)
     }
@@ -50,6 +44,56 @@ pub(super) struct Span {
 impl Span {
     pub(super) fn range(self) -> Range<usize> {
         self.start as usize..(self.start + self.len) as usize
+    }
+}
+
+/// The pairs that one thread has found, and how many of each group.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Found {
+    /// In no particular order.
+    pub(crate) pairs: ShrinkingVec<Pair>,
+    /// By group of `a`: pairs found. Empty if pairs are not counted by group.
+    groups: Vec<u32>,
+    shift: u32,
+}
+
+impl Found {
+    /// Forgets the pairs; counts the next ones by group, if there is a grouping.
+    pub(crate) fn begin(&mut self, grouping: Option<Grouping>) {
+        let Grouping { count, shift, .. } = grouping.unwrap_or_default();
+        self.pairs.clear();
+        self.groups.clear();
+        self.groups.resize(count, 0);
+        self.shift = shift;
+    }
+
+    /// Counts the pairs from `from` on by group.
+    #[inline(always)]
+    pub(crate) fn count(&mut self, from: usize) {
+        if !self.groups.is_empty() {
+            for pair in &self.pairs[from..] {
+                self.groups[(pair.a >> self.shift) as usize] += 1;
+            }
+        }
+    }
+
+    /// Takes pairs that were found elsewhere, and leaves other memory for them.
+    pub(crate) fn take(&mut self, pairs: &mut Vec<Pair>) {
+        self.pairs.swap_list(pairs);
+        self.count(0);
+    }
+
+    pub(crate) fn add(&mut self, pairs: &[Pair]) {
+        let from = self.pairs.len();
+        self.pairs.extend_from_slice(pairs);
+        self.count(from);
+    }
+
+    /// Forgets the pairs, and gives back memory if as many as `needed` are expected.
+    pub(crate) fn settle(&mut self, needed: usize) {
+        let needed = needed.max(self.pairs.len());
+        self.pairs.clear();
+        self.pairs.settle(needed);
     }
 }
 
@@ -123,7 +167,6 @@ impl Groups {
         next as usize
     }
 
-    /// Returns the number of pairs gathered.
     pub(super) fn len(&self) -> usize {
         self.starts.last().map_or(0, |&count| count as usize)
     }
@@ -208,45 +251,6 @@ impl Sorter {
     }
 }
 
-/// Sorts pairs by the highest bits of `a`, into `to`.
-fn sort_roughly(pairs: &[Pair], to: &mut Vec<Pair>, counts: &mut Vec<u32>, ids: usize) {
-    let shift = (usize::BITS - ids.leading_zeros()).saturating_sub(RADIX_BITS);
-    ensure_scratch(to, pairs.len(), Pair::default());
-    counts.clear();
-    counts.resize(1 << RADIX_BITS, 0);
-    pairs.iter().for_each(|pair| counts[(pair.a >> shift) as usize] += 1);
-    let mut next = 0;
-    for count in counts.iter_mut() {
-        next += std::mem::replace(count, next);
-    }
-    for pair in pairs {
-        let place = &mut counts[(pair.a >> shift) as usize];
-        to[*place as usize] = *pair;
-        *place += 1;
-    }
-}
-
-/// Sorts pairs: roughly by `a` first if they are many.
-pub(super) fn sort(
-    pairs: &mut ShrinkingVec<Pair>,
-    sorted: &mut ShrinkingVec<Pair>,
-    counts: &mut Vec<u32>,
-    ids: usize,
-) {
-    let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
-    if pairs.len() < 1 << RADIX_BITS {
-        return pairs.sort_unstable_by_key(word);
-    }
-    sort_roughly(pairs, sorted, counts, ids);
-    sorted.truncate(pairs.len());
-    std::mem::swap(pairs, sorted);
-    let mut start = 0;
-    for &end in &*counts {
-        pairs[start..end as usize].sort_unstable_by_key(word);
-        start = end as usize;
-    }
-}
-
 /// Shortens the rows of a group that have an id twice. The group's first row begins at `base`. A sorted row that repeats an id has every
 /// id of the row and no other, but perhaps not in order.
 pub(super) fn drop_repeated(spans: &mut [Span], others: &mut [u32], base: u32) {
@@ -324,22 +328,5 @@ mod tests {
         drop_repeated(&mut spans, &mut others, 100);
         let rows = spans.map(|span| others[span.start as usize - 100..][..span.len as usize].to_vec());
         assert_eq!(rows, [vec![3], vec![5, 9], vec![], vec![7], vec![1, 2]]);
-    }
-
-    #[test]
-    fn many_events_are_sorted_whatever_the_number_of_ids() {
-        let (mut sorted, mut counts) = (ShrinkingVec::default(), vec![]);
-        for ids in [2047, 2048, 2049, (1 << 20) - 1, 1 << 20, (1 << 20) + 1] {
-            for len in [0, 10, 2047, 2048, 5000] {
-                let id = |i: u64| (i * 0x9E37_79B9 % ids) as u32;
-                let mut pairs = ShrinkingVec::default();
-                pairs.extend((0..len).map(|i| Pair::new(id(i), id(i + len))));
-                pairs.push(Pair { a: ids as u32 - 2, b: ids as u32 - 1 });
-                let mut wanted = pairs.to_vec();
-                wanted.sort_unstable();
-                sort(&mut pairs, &mut sorted, &mut counts, ids as usize);
-                assert_eq!(*pairs, wanted, "{len} pairs of {ids} ids");
-            }
-        }
     }
 }

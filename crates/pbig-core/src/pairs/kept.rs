@@ -29,13 +29,10 @@ pub(super) struct Rows {
 }
 
 impl Rows {
+    /// Returns a row. The span of an empty one may lie beyond the pool, because the pool was replaced since.
     pub(super) fn row(&self, id: u32) -> &[u32] {
-        self.spans.get(id as usize).map_or(&[], |span| self.at(*span))
-    }
-
-    /// Returns the row of a span. The span of an empty row may lie beyond the pool, because the pool was replaced since.
-    fn at(&self, span: Span) -> &[u32] {
-        self.pool.get(span.range()).unwrap_or(&[])
+        let span = self.spans.get(id as usize);
+        span.and_then(|span| self.pool.get(span.range())).unwrap_or(&[])
     }
 
     fn move_to_end(&mut self, id: u32, span: Span, more: u32) -> Span {
@@ -137,7 +134,6 @@ pub(crate) struct Kept {
 }
 
 impl Kept {
-    /// Returns the number of pairs.
     pub(crate) fn len(&self) -> usize {
         self.len
     }
@@ -151,7 +147,6 @@ impl Kept {
         }
     }
 
-    /// Yields all pairs, sorted.
     pub(crate) fn iter(&self) -> impl Iterator<Item = Pair> {
         (0..self.forward.spans.len() as u32)
             .flat_map(|a| self.forward.row(a).iter().map(move |&b| Pair { a, b }))
@@ -180,13 +175,11 @@ impl Kept {
         self.forward.row(id)
     }
 
-    /// Returns the number of pairs of a box.
     pub(crate) fn degree(&self, id: u32) -> u32 {
         let i = id as usize;
         self.forward.spans.get(i).map_or(0, |span| span.len + self.lower[i])
     }
 
-    /// Returns true if a pair exists.
     pub(crate) fn contains(&self, pair: Pair) -> bool {
         self.forward.row(pair.a).binary_search(&pair.b).is_ok()
     }
@@ -230,13 +223,11 @@ impl Kept {
         }
     }
 
-    /// Changes the rows of `a` and of `b`.
     fn change(&mut self, pairs: &[Pair], change: fn(&mut Rows, &[Pair])) {
         self.forward.change(pairs, change);
         self.change_backward(pairs, change);
     }
 
-    /// Changes the rows of `b`, if there are any.
     fn change_backward(&mut self, pairs: &[Pair], change: fn(&mut Rows, &[Pair])) {
         if let Some(rows) = self.backward.get_mut() {
             self.turned.clear();
@@ -267,22 +258,6 @@ impl Kept {
         }
         self.change_backward(removed, Rows::remove);
         self.change_backward(added, Rows::insert);
-    }
-
-    /// Replaces all pairs by sorted ones.
-    #[cfg(feature = "serde")]
-    pub(crate) fn replace(&mut self, pairs: &[Pair], ids: usize) {
-        *self = Self::default();
-        self.reserve_ids(ids);
-        for pair in pairs {
-            let span = &mut self.forward.spans[pair.a as usize];
-            if span.len == 0 {
-                span.start = self.forward.pool.len() as u32;
-            }
-            span.len += 1;
-            self.forward.pool.push(pair.b);
-        }
-        self.count(pairs, &[]);
     }
 
     /// Gives back a piece of the memory that fewer pairs than before do not need. The last update had `events` of a kind.

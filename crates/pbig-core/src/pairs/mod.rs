@@ -5,13 +5,11 @@
 //! ```
 
 mod compare;
-mod found;
 mod groups;
 mod kept;
 mod row;
 
 pub(crate) use compare::Comparison;
-pub(crate) use found::Found;
-pub(crate) use groups::{Grouping, Groups};
+pub(crate) use groups::{Found, Grouping, Groups};
 pub(crate) use kept::Kept;
 pub(crate) use row::{differences, equal, sort_few};

@@ -73,7 +73,6 @@ fn sort_by_counting(from: &[u32], len: usize, to: &mut [u32]) {
     }
 }
 
-/// A row at a range of a pool.
 type RowAt<'a> = (&'a [u32], Range<usize>);
 
 /// Appends the pairs of `a` that are in one of two sorted rows only: to `removed` if in the old one.
@@ -158,7 +157,6 @@ mod tests {
         }
     }
 
-    /// Sorts three rows that follow each other.
     fn sorted(simd: impl Simd, pool: &[u32], len: usize) -> Vec<u32> {
         let (mut to, mut long) = (vec![0; 3 * len], IdSet::default());
         for row in 0..3 {

@@ -63,7 +63,6 @@ impl GivenUp {
         is_like_it
     }
 
-    /// Notes whether the way was given up.
     pub(crate) fn note(&mut self, is_given_up: bool, changed: usize) {
         if is_given_up {
             let searches = (2 * self.searches).clamp(1, MAX_SEARCHES);

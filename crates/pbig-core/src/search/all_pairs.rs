@@ -2,7 +2,7 @@
 //! pair of a few.
 
 use super::brute::{brute_force, brute_force_across};
-use super::grid::{Grid, GridPlan, TwoGrids};
+use super::grid::{Cells, Grid, TwoGrids};
 use super::hits::{ById, Hits, Receiver, Rule};
 use super::{Budget, DeviceSlot, join, streamed};
 use crate::bvh::BoxIndex;
@@ -16,7 +16,6 @@ use crate::{
 };
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A search: boxes, filters and settings.
 #[derive(Clone, Copy)]
 pub(crate) struct Request<'a> {
     pub(crate) boxes: &'a [Aabb],
@@ -36,13 +35,13 @@ pub(crate) struct Request<'a> {
 }
 
 impl<'a> Request<'a> {
-    /// Makes a search for all pairs of boxes, whose groups are not counted.
-    pub(crate) fn new(boxes: &'a [Aabb], config: &'a Config) -> Self {
+    /// Makes a search for all pairs of one set, whose groups are not counted.
+    pub(crate) fn of_one(&Boxes { boxes, filters, keys }: &Boxes<'a>, config: &'a Config) -> Self {
         Self {
             boxes,
             others: None,
-            filters: None,
-            keys: None,
+            filters: filters.map(ById::of_one),
+            keys: keys.map(ById::of_one),
             receiver: None,
             config,
             grouping: None,
@@ -50,14 +49,6 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Makes a search for the pairs of one set.
-    pub(crate) fn of_one(all: &Boxes<'a>, config: &'a Config) -> Self {
-        let Boxes { boxes, filters, keys } = *all;
-        let (filters, keys) = (filters.map(ById::of_one), keys.map(ById::of_one));
-        Self { filters, keys, ..Self::new(boxes, config) }
-    }
-
-    /// Returns the number of boxes, of both sets.
     fn count(&self) -> usize {
         self.boxes.len() + self.others.map_or(0, <[_]>::len)
     }
@@ -77,7 +68,6 @@ impl<'a> Request<'a> {
         Rule { filters, keys, receiver, max_pairs, found, budget: None }
     }
 
-    /// Returns true if every pair should be tested.
     fn is_for_brute_force(&self) -> bool {
         let smaller = self.others.map(|others| others.len().min(self.boxes.len()));
         let is_few = self.count() <= policy::BRUTE_FORCE_UP_TO_BOXES
@@ -103,14 +93,12 @@ pub(crate) struct Store {
 }
 
 impl Store {
-    /// Notes that a grid and a tree were given up.
     #[cfg(test)]
     pub(crate) fn note_given_up(&mut self) {
         self.grids.note(true, 0);
         self.trees.note(true, 0);
     }
 
-    /// Gives back memory that the boxes of the last search did not need.
     pub(crate) fn settle(&mut self) {
         self.grid.settle();
     }
@@ -164,11 +152,10 @@ impl AllPairs {
         let (made, overlaps) = (sum(|hits| hits.tests), sum(|hits| hits.overlaps));
         report.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
         report.work += sum(Hits::work);
-        let are_too_many = self.hits.iter().any(Hits::is_full) || self.count() > rule.max_pairs;
+        let are_too_many = self.hits.iter().any(|hits| hits.is_full) || self.count() > rule.max_pairs;
         if are_too_many { Err(Error::TooManyPairs { limit: rule.max_pairs }) } else { Ok(()) }
     }
 
-    /// Returns the number of pairs of the last search.
     pub(crate) fn count(&self) -> u64 {
         self.hits.iter().map(Hits::count).sum()
     }
@@ -222,20 +209,20 @@ impl AllPairs {
     ) -> bool {
         let (boxes, workers) = (request.boxes, self.hits.len());
         let mut clock = Clock::start();
-        let plan = {
+        let cells = {
             stage!("plan");
-            GridPlan::new(boxes, request.others, workers)
+            Cells::new(boxes, request.others, workers)
         };
         report.stages.plan += clock.lap();
         let sorted = {
             stage!("map");
             match request.others {
-                Some(others) => store.two_grids.build(plan, [boxes, others], workers),
-                None => store.grid.build(plan, boxes, workers),
+                Some(others) => store.two_grids.build(cells, [boxes, others], workers),
+                None => store.grid.build(cells, boxes, workers),
             }
         };
         report.stages.map += clock.lap();
-        report.set_plan(plan.told(sorted.boxes(), sorted.oversize_count()));
+        report.set_plan(cells.told(sorted.boxes(), sorted.oversize_count()));
         stage!("check");
         let most = search::grid_up_to_work(sorted.boxes());
         // A receiver's search runs twice if it may fail, so it may as well take twice the budget.
@@ -315,7 +302,6 @@ impl AllPairs {
         true
     }
 
-    /// Gathers what was found, for sorting.
     pub(crate) fn gather(&mut self, grouping: Grouping, groups: &mut Groups) -> usize {
         let workers = self.hits.len();
         groups.gather(grouping, (&mut self.hits, |hits| &mut hits.found), workers)

@@ -35,7 +35,6 @@ impl Block {
     }
 }
 
-/// Tests each box against those behind it.
 #[inline(always)]
 fn test_all(
     simd: impl Simd,

@@ -14,7 +14,6 @@ impl Budget {
         Self { limit, spent: AtomicU64::new(0) }
     }
 
-    /// Adds work.
     pub(crate) fn charge(&self, work: u64) {
         self.spent.fetch_add(work, Ordering::Relaxed);
     }

@@ -14,7 +14,6 @@ pub(crate) struct DeviceSlot {
 }
 
 impl DeviceSlot {
-    /// Makes a slot with a device.
     pub(crate) fn new(device: Box<dyn PairDevice>) -> Self {
         Self { device: Some(device), ..Self::default() }
     }

@@ -6,12 +6,12 @@
 
 use super::Budget;
 use super::brute::Block;
-use super::record::Record;
+use crate::aabb::one_box;
 use crate::boxes::share_no_key;
 use crate::pairs::{Found, Grouping};
 use crate::policy::search::{WORK_OF_EXACT_TEST, WORK_OF_VAGUE_TEST, in_vain};
 use crate::simd::{BLOCK, Simd, eight_from, prefetch};
-use crate::{Keys, Pair, ProxyFilter};
+use crate::{Aabb, Keys, Pair, ProxyFilter};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Number of hits that are tested together.
@@ -29,6 +29,36 @@ pub(super) const BATCH: usize = 4096;
 /// Work, in tests of codes, that is charged before a piece of work is done.
 pub(super) const CHARGED_FROM: u64 = 1 << 16;
 
+/// A box with its id and the key of its cell: half a cache line.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Record {
+    pub(crate) aabb: Aabb,
+    pub(crate) id: u32,
+    pub(crate) key: u32,
+}
+
+const _: () = assert!(size_of::<Record>() == 32);
+
+impl Record {
+    pub(crate) const EMPTY: Self = Self { aabb: Aabb::NOWHERE, id: 0, key: 0 };
+
+    /// Makes a record by words of eight bytes. Otherwise a copy of the record would wait until eight separate writes are done.
+    #[inline(always)]
+    pub(crate) fn new(aabb: Aabb, id: u32, key: u32) -> Self {
+        let [x, y, z]: [u64; 3] = bytemuck::cast(aabb);
+        let tail = u64::from_ne_bytes(bytemuck::cast([id, key]));
+        bytemuck::cast([x, y, z, tail])
+    }
+
+    /// The exact test of two valid boxes, see [`Aabb::overlaps`]. A record has two numbers behind its box, so that both
+    /// corners can be loaded as four lanes.
+    #[inline(always)]
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
+        one_box::records_overlap(bytemuck::cast_ref(self), bytemuck::cast_ref(other))
+    }
+}
+
 /// Receiver of pairs that are not listed, some at a time. Each thread calls it.
 pub(crate) type Receiver<'a> = &'a (dyn Fn(&[Pair]) + Sync);
 
@@ -44,12 +74,10 @@ pub(crate) struct ById<'a, T> {
 }
 
 impl<'a, T> ById<'a, T> {
-    /// Takes the values of one set.
     pub(crate) fn of_one(values: &'a [T]) -> Self {
         Self { first: values, second: values, split: 0 }
     }
 
-    /// Takes the values of two sets.
     pub(crate) fn of_two([first, second]: [&'a [T]; 2]) -> Self {
         Self { first, second, split: first.len() }
     }
@@ -120,7 +148,6 @@ pub(super) struct HitWriter<'a> {
 }
 
 impl<'a> HitWriter<'a> {
-    /// Returns a writer without hits.
     pub(super) fn new(blocks: &'a mut [u64; HIT_ROOM]) -> Self {
         Self { blocks, len: 0, tests: 0, rows: 0 }
     }
@@ -169,11 +196,6 @@ impl Hits {
         if self.work() - self.charged.0 > CHARGED_FROM {
             self.charge(budget);
         }
-    }
-
-    /// Returns true if no more pairs are wanted.
-    pub(crate) fn is_full(&self) -> bool {
-        self.is_full
     }
 
     /// Tests all hits exactly and keeps the pairs that the rule allows. Queries have slots of the first records, blocks of the
@@ -251,7 +273,6 @@ impl Hits {
         }
     }
 
-    /// Hands over the pairs so far.
     pub(crate) fn hand_over(&mut self, receiver: Receiver<'_>) {
         self.handed_over += self.found.pairs.len() as u64;
         receiver(&self.found.pairs);

@@ -40,7 +40,6 @@ fn joined(index: &BoxIndex, split: Option<u32>) -> (u32, u32) {
     (second_set, second_set)
 }
 
-/// Returns the last leaf below each node.
 fn last_leaves(index: &BoxIndex) -> Vec<u32> {
     let mut last: Vec<u32> = (0..index.end).collect();
     for node in index.leaves..index.end {
@@ -64,7 +63,7 @@ impl Join<'_, '_> {
     fn meet_all(simd: impl Simd, join: &mut Self, leaves: Range<usize>) {
         let mut waiting = Vec::new();
         for leaf in leaves {
-            if join.hits.is_full() {
+            if join.hits.is_full {
                 return;
             }
             join.meet(simd, leaf as u32, &mut waiting);

@@ -13,7 +13,6 @@ mod device_slot;
 pub(crate) mod grid;
 mod hits;
 mod join;
-mod record;
 mod streamed;
 
 pub(crate) use all_pairs::{AllPairs, Request, Store};

@@ -96,7 +96,7 @@ struct Stream<'a, 'b> {
 impl Stream<'_, '_> {
     /// Finds the pairs of an interval and a point on an axis that overlap on the lower ones. On the higher ones all overlap.
     fn find(&mut self, intervals: &[Corners], points: &mut [Corners], axis: usize) {
-        if self.hits.is_full() {
+        if self.hits.is_full {
             return;
         }
         if intervals.len().min(points.len()) <= FEW {
@@ -136,7 +136,7 @@ impl Stream<'_, '_> {
 
     fn push_all(&mut self, intervals: &[Corners], points: &[Corners]) {
         for one in intervals {
-            if self.hits.is_full() {
+            if self.hits.is_full {
                 return;
             }
             self.hits.tests += points.len() as u64;

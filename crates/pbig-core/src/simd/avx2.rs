@@ -1,7 +1,7 @@
 //! Primitives of AVX2, which all x86-64 processors of the last ten years have.
 
 use super::codes::{MAX_STEP, MIN_STEP, Steps};
-use super::{BLOCK, Eight, Simd};
+use super::{BLOCK, Eight, Simd, lanewise};
 use crate::Aabb;
 use crate::aabb::sse::corners;
 use std::arch::x86_64::*;
@@ -86,39 +86,18 @@ impl Simd for Avx2 {
         by!(_mm256_cvtepu8_epi32(_mm_cvtsi64_si128(bytes as i64)))
     }
 
-    #[inline(always)]
-    fn add(self, a: __m256i, b: __m256i) -> __m256i {
-        by!(_mm256_add_epi32(a, b))
-    }
-
-    #[inline(always)]
-    fn and(self, a: __m256i, b: __m256i) -> __m256i {
-        by!(_mm256_and_si256(a, b))
-    }
-
-    #[inline(always)]
-    fn or(self, a: __m256i, b: __m256i) -> __m256i {
-        by!(_mm256_or_si256(a, b))
+    lanewise! { __m256i:
+        add(a, b) => by!(_mm256_add_epi32(a, b));
+        and(a, b) => by!(_mm256_and_si256(a, b));
+        or(a, b) => by!(_mm256_or_si256(a, b));
+        min(a, b) => by!(_mm256_min_epu32(a, b));
+        max(a, b) => by!(_mm256_max_epu32(a, b));
+        equal(a, b) => by!(_mm256_cmpeq_epi32(a, b));
     }
 
     #[inline(always)]
     fn not(self, a: __m256i) -> __m256i {
         by!(_mm256_xor_si256(a, _mm256_set1_epi32(-1)))
-    }
-
-    #[inline(always)]
-    fn min(self, a: __m256i, b: __m256i) -> __m256i {
-        by!(_mm256_min_epu32(a, b))
-    }
-
-    #[inline(always)]
-    fn max(self, a: __m256i, b: __m256i) -> __m256i {
-        by!(_mm256_max_epu32(a, b))
-    }
-
-    #[inline(always)]
-    fn equal(self, a: __m256i, b: __m256i) -> __m256i {
-        by!(_mm256_cmpeq_epi32(a, b))
     }
 
     #[inline(always)]

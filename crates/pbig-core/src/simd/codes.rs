@@ -32,7 +32,6 @@ pub(super) static SET_BITS: [u64; 256] = {
     table
 };
 
-/// Returns a corner in steps.
 #[inline(always)]
 pub(super) fn steps(origin: &[f64; 4], scale: &[f64; 4], &[x, y, z]: &[f32; 3]) -> Steps {
     let (corner, mut steps) = ([x, y, z, 0.0], [0; 4]);
@@ -51,26 +50,6 @@ pub(super) fn steps(origin: &[f64; 4], scale: &[f64; 4], &[x, y, z]: &[f32; 3]) 
 fn round_to_i32(x: f64) -> i32 {
     const SHIFT: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52
     (x + SHIFT).to_bits() as i32
-}
-
-/// See [`Simd::key`](super::Simd::key).
-#[inline(always)]
-pub(super) fn key(dims: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32 {
-    let mut cell = point.map(|step| step >> shift);
-    for k in 0..3 {
-        cell[k] = if wraps { cell[k] & (dims[k] - 1) } else { cell[k].clamp(1, dims[k] - 2) };
-    }
-    ((cell[2] * dims[1] + cell[1]) * dims[0] + cell[0]) as u32
-}
-
-/// Returns the code of a box: `-low` and `high` on each axis, modulo 512 steps, ten bits a field.
-#[inline(always)]
-pub(super) fn code(low: Steps, high: Steps) -> u64 {
-    let half = |of: [i32; 4]| {
-        let field = |k: usize| (of[k] as u32 & 511) << (10 * k);
-        field(0) | field(1) | field(2)
-    };
-    u64::from(half(low.map(i32::wrapping_neg))) | u64::from(half(high)) << 32
 }
 
 /// Returns the query that finds the codes of boxes which overlap the box of `code`.

@@ -13,7 +13,6 @@ pub(crate) trait Simd: Copy {
     /// Calls a function that is inlined here, compiled for the instructions.
     fn run<T>(self, work: impl FnOnce() -> T) -> T;
 
-    /// Reads eight numbers.
     fn load(self, row: &Eight) -> Self::Row;
 
     /// Returns the eight numbers of a row.
@@ -83,7 +82,11 @@ pub(crate) trait Simd: Copy {
     /// point is wrapped into these, or clamped into those that have neighbours on both sides.
     #[inline(always)]
     fn key(self, dims: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32 {
-        codes::key(dims, shift, wraps, point)
+        let mut cell = point.map(|step| step >> shift);
+        for k in 0..3 {
+            cell[k] = if wraps { cell[k] & (dims[k] - 1) } else { cell[k].clamp(1, dims[k] - 2) };
+        }
+        ((cell[2] * dims[1] + cell[1]) * dims[0] + cell[0]) as u32
     }
 
     /// Returns true for a valid box with these extents at most.
@@ -94,10 +97,14 @@ pub(crate) trait Simd: Copy {
         fits(0) & fits(1) & fits(2)
     }
 
-    /// Returns the code of a box.
+    /// Returns the code of a box: `-low` and `high` on each axis, modulo 512 steps, ten bits a field.
     #[inline(always)]
     fn code(self, low: Steps, high: Steps) -> u64 {
-        codes::code(low, high)
+        let half = |of: Steps| {
+            let field = |k: usize| (of[k] as u32 & 511) << (10 * k);
+            field(0) | field(1) | field(2)
+        };
+        u64::from(half(low.map(i32::wrapping_neg))) | u64::from(half(high)) << 32
     }
 
     /// Returns eight integers, sorted, by a network of six steps.
@@ -245,7 +252,6 @@ fn exchange<S: Simd>(simd: S, row: S::Row, [partners, upper]: &[Eight; 2]) -> S:
     simd.select(simd.load(upper), simd.max(row, other), simd.min(row, other))
 }
 
-/// Reads eight floats.
 #[inline(always)]
 fn floats<S: Simd>(simd: S, row: &[f32; BLOCK]) -> S::Row {
     simd.load(bytemuck::cast_ref(row))

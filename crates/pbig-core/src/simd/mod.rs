@@ -35,6 +35,17 @@ pub(crate) fn eight_from(list: &mut [u32], from: usize) -> &mut Eight {
     list[from..].first_chunk_mut().expect("lists have room for a block more")
 }
 
+/// Defines primitives of two rows, lane by lane, on a type of rows.
+macro_rules! lanewise {
+    ($row:ty: $($name:ident($a:ident, $b:ident) => $body:expr;)*) => {$(
+        #[inline(always)]
+        fn $name(self, $a: $row, $b: $row) -> $row {
+            $body
+        }
+    )*};
+}
+use lanewise;
+
 /// Returns the instructions that the CPU backend uses on this machine: "AVX2", "NEON" or "portable".
 ///
 /// ```

@@ -1,6 +1,6 @@
 //! Primitives of NEON, which all 64-bit ARM processors have.
 
-use super::{BLOCK, Eight, Simd};
+use super::{BLOCK, Eight, Simd, lanewise};
 use crate::Aabb;
 use std::arch::aarch64::*;
 
@@ -8,7 +8,6 @@ use std::arch::aarch64::*;
 #[derive(Clone, Copy)]
 pub(crate) struct Neon;
 
-/// Two registers of four numbers.
 type Row = [uint32x4_t; 2];
 
 /// Evaluates an expression of intrinsics.
@@ -61,44 +60,19 @@ impl Simd for Neon {
         })
     }
 
-    #[inline(always)]
-    fn add(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| by!(vaddq_u32(a, b)))
-    }
-
-    #[inline(always)]
-    fn and(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| by!(vandq_u32(a, b)))
-    }
-
-    #[inline(always)]
-    fn or(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| by!(vorrq_u32(a, b)))
+    lanewise! { Row:
+        add(a, b) => zip(a, b, |a, b| by!(vaddq_u32(a, b)));
+        and(a, b) => zip(a, b, |a, b| by!(vandq_u32(a, b)));
+        or(a, b) => zip(a, b, |a, b| by!(vorrq_u32(a, b)));
+        min(a, b) => zip(a, b, |a, b| by!(vminq_u32(a, b)));
+        max(a, b) => zip(a, b, |a, b| by!(vmaxq_u32(a, b)));
+        equal(a, b) => zip(a, b, |a, b| by!(vceqq_u32(a, b)));
+        at_most_f32(a, b) => zip(a, b, |a, b| by!(vcleq_f32(vreinterpretq_f32_u32(a), vreinterpretq_f32_u32(b))));
     }
 
     #[inline(always)]
     fn not(self, a: Row) -> Row {
         by!(a.map(|a| vmvnq_u32(a)))
-    }
-
-    #[inline(always)]
-    fn min(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| by!(vminq_u32(a, b)))
-    }
-
-    #[inline(always)]
-    fn max(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| by!(vmaxq_u32(a, b)))
-    }
-
-    #[inline(always)]
-    fn equal(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| by!(vceqq_u32(a, b)))
-    }
-
-    #[inline(always)]
-    fn at_most_f32(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| by!(vcleq_f32(vreinterpretq_f32_u32(a), vreinterpretq_f32_u32(b))))
     }
 
     #[inline(always)]
@@ -162,7 +136,6 @@ impl Simd for Neon {
     }
 }
 
-/// Returns four boxes axis by axis.
 #[inline(always)]
 fn by_axis(boxes: &[&Aabb]) -> [uint32x4_t; 6] {
     // SAFETY: NEON is part of the architecture. A box is six numbers; the loads are of the first four and the last four.

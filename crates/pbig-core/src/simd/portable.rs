@@ -1,13 +1,11 @@
 //! Primitives in plain Rust, which a compiler turns into whatever vectors its target has.
 
-use super::{BLOCK, Eight, EightBoxes, Simd};
+use super::{BLOCK, Eight, EightBoxes, Simd, lanewise};
 use crate::Aabb;
 
-/// Any processor.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable;
 
-/// Applies a function lane by lane.
 #[inline(always)]
 fn zip(a: Eight, b: Eight, of: impl Fn(u32, u32) -> u32) -> Eight {
     let mut row = [0; BLOCK];
@@ -52,19 +50,14 @@ impl Simd for Portable {
         bytes.to_le_bytes().map(u32::from)
     }
 
-    #[inline(always)]
-    fn add(self, a: Eight, b: Eight) -> Eight {
-        zip(a, b, u32::wrapping_add)
-    }
-
-    #[inline(always)]
-    fn and(self, a: Eight, b: Eight) -> Eight {
-        zip(a, b, |a, b| a & b)
-    }
-
-    #[inline(always)]
-    fn or(self, a: Eight, b: Eight) -> Eight {
-        zip(a, b, |a, b| a | b)
+    lanewise! { Eight:
+        add(a, b) => zip(a, b, u32::wrapping_add);
+        and(a, b) => zip(a, b, |a, b| a & b);
+        or(a, b) => zip(a, b, |a, b| a | b);
+        min(a, b) => zip(a, b, u32::min);
+        max(a, b) => zip(a, b, u32::max);
+        equal(a, b) => zip(a, b, |a, b| u32::from(a == b).wrapping_neg());
+        at_most_f32(a, b) => zip(a, b, |a, b| u32::from(f32::from_bits(a) <= f32::from_bits(b)).wrapping_neg());
     }
 
     #[inline(always)]
@@ -73,30 +66,8 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn min(self, a: Eight, b: Eight) -> Eight {
-        zip(a, b, u32::min)
-    }
-
-    #[inline(always)]
-    fn max(self, a: Eight, b: Eight) -> Eight {
-        zip(a, b, u32::max)
-    }
-
-    #[inline(always)]
-    fn equal(self, a: Eight, b: Eight) -> Eight {
-        zip(a, b, |a, b| u32::from(a == b).wrapping_neg())
-    }
-
-    #[inline(always)]
-    fn at_most_f32(self, a: Eight, b: Eight) -> Eight {
-        zip(a, b, |a, b| u32::from(f32::from_bits(a) <= f32::from_bits(b)).wrapping_neg())
-    }
-
-    #[inline(always)]
     fn select(self, mask: Eight, set: Eight, unset: Eight) -> Eight {
-        zip(zip(mask, set, |mask, set| mask & set), zip(mask, unset, |mask, unset| !mask & unset), |a, b| {
-            a | b
-        })
+        self.or(self.and(mask, set), self.and(self.not(mask), unset))
     }
 
     #[inline(always)]

@@ -93,27 +93,6 @@ fn an_update_refits_the_tree_only_for_queries_like_those_since_the_last_one() {
     assert_eq!(fresh, [false, false, true, true, false, false]);
 }
 
-/// Look-ups and queries share the tree, which knows each change: between updates, within one and after several.
-#[test]
-fn the_tree_knows_all_changes() {
-    let mut broad_phase = BroadPhase::default();
-    let all = Aabb::new([f32::MIN; 3], [f32::MAX; 3]);
-    for time in 0..40u32 {
-        let now = time as f32 / 8.0;
-        step(&mut broad_phase, now, [1, 9, 100, 2000][time as usize % 4]);
-        if time % 3 == 0 {
-            let id = 37 * time;
-            broad_phase.remove(id);
-            assert_eq!(met(&broad_phase, &all).len(), broad_phase.len());
-            broad_phase.set(id, cube(id, now), ProxyFilter::ALL).expect("an id below the limit");
-        }
-        for id in (0..BOXES).step_by(997 + time as usize) {
-            let fat = broad_phase.fat_aabb(id).expect("a box");
-            assert!(met(&broad_phase, &fat).contains(&id), "update {time}, box {id}");
-        }
-    }
-}
-
 /// Boxes of several sizes and shapes, in parts of the tree of several heights. Some jump, some go, some come back elsewhere, and after
 /// a while all move. Answers are those of a scan, and pairs those of a search from nothing.
 #[test]

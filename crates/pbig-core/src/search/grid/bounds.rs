@@ -28,13 +28,11 @@ impl Bounds {
     const NONE: Self = Self { low: [FARTHEST; 4], high: [-FARTHEST; 4], extent: [0.0; 4] };
     const EMPTY: Self = Self { low: [f32::INFINITY; 4], high: [f32::NEG_INFINITY; 4], extent: [0.0; 4] };
 
-    /// Measures the boxes of two lists.
     pub(super) fn of_both([first, second]: [&[Aabb]; 2], workers: usize) -> Self {
         let bounds = Self::of(first, workers);
         if second.is_empty() { bounds } else { bounds.merged(&Self::of(second, workers)) }
     }
 
-    /// Measures all boxes.
     fn of(boxes: &[Aabb], workers: usize) -> Self {
         if workers <= 1 {
             return Self::NONE.widened(boxes).limited();
@@ -63,7 +61,6 @@ impl Bounds {
         self
     }
 
-    /// Returns the largest extent of all axes.
     pub(super) fn largest(&self) -> f32 {
         largest(&self.extent)
     }
@@ -107,7 +104,6 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    /// Draws a sample.
     pub(super) fn of_both([first, second]: [&[Aabb]; 2]) -> Self {
         let mut sample = Self { boxes: [Aabb::NOWHERE; SAMPLE_SIZE], len: 0 };
         let at = |i: usize| if i < first.len() { first[i] } else { second[i - first.len()] };
@@ -119,7 +115,6 @@ impl Sample {
         sample
     }
 
-    /// Returns the boxes.
     pub(super) fn boxes(&self) -> &[Aabb] {
         &self.boxes[..self.len]
     }
@@ -138,7 +133,6 @@ impl Sample {
         })
     }
 
-    /// Returns the median of the boxes' largest extents.
     pub(super) fn median_extent(&self) -> f32 {
         self.nth(self.len / 2, |aabb| largest(&aabb.extents()))
     }
@@ -169,7 +163,6 @@ pub struct SizeClass {
     pub extent: [f32; 3],
 }
 
-/// Counts the valid boxes of two lists by size class.
 pub(super) fn size_classes_of_both([first, second]: [&[Aabb]; 2], workers: usize) -> SizeClasses {
     let mut all = size_classes(first, workers);
     if !second.is_empty() {

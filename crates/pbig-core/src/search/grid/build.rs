@@ -6,12 +6,10 @@
 use super::Grid;
 use super::cells::Cells;
 use super::scan::Sorted;
-use super::spacing::GridPlan;
 use crate::Aabb;
 use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run_parts, split_evenly, split_into};
-use crate::search::record::Record;
-use crate::simd::TOMBSTONE;
-use crate::simd::{BLOCK, Simd, dispatch};
+use crate::search::hits::Record;
+use crate::simd::{BLOCK, Simd, TOMBSTONE, dispatch};
 
 /// Maximum number of buckets of the first sort: their write positions stay in the nearest cache.
 const MAX_BUCKETS: usize = 2047;
@@ -53,16 +51,16 @@ impl Split {
 
 impl Grid {
     /// Sorts the valid boxes, `boxes[id]` with the id `id`, into cells.
-    pub(crate) fn build(&mut self, plan: GridPlan, boxes: &[Aabb], workers: usize) -> Sorted<'_> {
-        let split = self.bring_into_buckets(plan, boxes, 0, workers);
+    pub(crate) fn build(&mut self, cells: Cells, boxes: &[Aabb], workers: usize) -> Sorted<'_> {
+        let split = self.bring_into_buckets(cells, boxes, 0, workers);
         self.sort_buckets(split, workers);
         Sorted { own: self, other: None }
     }
 
     /// Brings the valid boxes into buckets; the first box has this id.
-    fn bring_into_buckets(&mut self, plan: GridPlan, boxes: &[Aabb], first_id: u32, workers: usize) -> Split {
-        self.plan = plan;
-        let split = Split::new(boxes.len(), self.plan.cells.count(), workers);
+    fn bring_into_buckets(&mut self, cells: Cells, boxes: &[Aabb], first_id: u32, workers: usize) -> Split {
+        self.cells = cells;
+        let split = Split::new(boxes.len(), self.cells.count(), workers);
         self.reserve(boxes.len());
         self.count(boxes, split, workers);
         self.place(split);
@@ -76,7 +74,7 @@ impl Grid {
         ensure_scratch(&mut self.coarse, boxes, Record::EMPTY);
         ensure_scratch(&mut self.records, boxes, Record::EMPTY);
         ensure_scratch(&mut self.codes, boxes + 2 * BLOCK, TOMBSTONE);
-        ensure_scratch(&mut self.starts, self.plan.cells.count() + 4, 0);
+        ensure_scratch(&mut self.starts, self.cells.count() + 4, 0);
     }
 
     /// Computes keys, and counts boxes by bucket.
@@ -85,13 +83,13 @@ impl Grid {
         self.counts.resize(pieces, BucketCounts::ZERO);
         // In the memory of the codes, which are computed when the keys are no longer needed.
         let keys: &mut [u32] = bytemuck::cast_slice_mut(&mut self.codes);
-        let (keys, plan) = (&mut keys[..boxes.len()], &self.plan);
+        let (keys, cells) = (&mut keys[..boxes.len()], self.cells);
         let parts = split_evenly(keys, split.pieces).zip(&mut self.counts[..]);
         run_parts(workers, parts, |piece, (keys, counts)| {
             let range = piece_range(boxes.len(), piece, split.pieces);
             counts.0[..=split.buckets].fill(0);
             (counts.0[BucketCounts::OVERSIZE], counts.0[BucketCounts::INVALID]) = (0, 0);
-            dispatch!(count_keys, plan.cells, &boxes[range.clone()], keys, counts, split.shift);
+            dispatch!(count_keys, cells, &boxes[range.clone()], keys, counts, split.shift);
         });
     }
 
@@ -122,7 +120,6 @@ impl Grid {
         }
     }
 
-    /// Brings records into their buckets.
     fn scatter(&mut self, (boxes, first_id): (&[Aabb], u32), split: Split, workers: usize) {
         let coarse = SharedSlice::new(&mut self.coarse);
         let keys: &[u32] = bytemuck::cast_slice(&self.codes);
@@ -136,10 +133,10 @@ impl Grid {
 
     /// Sorts each bucket by cell, and computes codes.
     fn sort_buckets(&mut self, split: Split, workers: usize) {
-        let (cells, bucket_starts) = (self.plan.cells.count(), &self.bucket_starts);
-        let (coarse, plan) = (&self.coarse, &self.plan);
+        let (cells, count) = (self.cells, self.cells.count());
+        let (coarse, bucket_starts) = (&self.coarse, &self.bucket_starts);
         let slots = |bucket: usize| bucket_starts[bucket] as usize..bucket_starts[bucket + 1] as usize;
-        let keys = |bucket: usize| bucket << split.shift..((bucket + 1) << split.shift).min(cells);
+        let keys = |bucket: usize| bucket << split.shift..((bucket + 1) << split.shift).min(count);
         let slot_counts = || (0..split.buckets).map(|bucket| slots(bucket).len());
         let records =
             split_into(&mut self.records, slot_counts()).zip(split_into(&mut self.codes, slot_counts()));
@@ -147,25 +144,24 @@ impl Grid {
         run_parts(workers, records.zip(ends), |bucket, ((records, codes), ends)| {
             let (slots, first_key) = (slots(bucket), keys(bucket).start);
             let sorted = SortedBucket { first_key, first_slot: slots.start, ends, records, codes };
-            dispatch!(sort_bucket, plan.cells, &coarse[slots.clone()], sorted);
+            dispatch!(sort_bucket, cells, &coarse[slots.clone()], sorted);
         });
         self.starts[0] = 0;
-        self.starts[cells + 1..cells + 4].fill(self.len as u32);
+        self.starts[count + 1..count + 4].fill(self.len as u32);
         self.codes[self.len..self.len + 2 * BLOCK].fill(TOMBSTONE);
     }
 }
 
-/// The grids of two sets.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TwoGrids([Grid; 2]);
 
 impl TwoGrids {
     /// Sorts the valid boxes of two sets, of which the second has the ids behind the first's, each into a grid. Boxes that are
     /// searched for stay in their buckets, near those that they meet, unless an oversize box of the other set meets them in cells.
-    pub(crate) fn build(&mut self, plan: GridPlan, boxes: [&[Aabb]; 2], workers: usize) -> Sorted<'_> {
+    pub(crate) fn build(&mut self, cells: Cells, boxes: [&[Aabb]; 2], workers: usize) -> Sorted<'_> {
         let [first, second] = &mut self.0;
-        let first_split = first.bring_into_buckets(plan, boxes[0], 0, workers);
-        let second_split = second.bring_into_buckets(plan, boxes[1], boxes[0].len() as u32, workers);
+        let first_split = first.bring_into_buckets(cells, boxes[0], 0, workers);
+        let second_split = second.bring_into_buckets(cells, boxes[1], boxes[0].len() as u32, workers);
         let is_first_smaller = first.len <= second.len;
         let (first, second) = ((first, first_split), (second, second_split));
         let ((own, own_split), (other, split)) =
@@ -191,8 +187,8 @@ fn count_keys(
     shift: u32,
 ) {
     for (aabb, to) in boxes.iter().zip(keys) {
-        let takes = cells.takes(simd, aabb);
-        let mut key = cells.key_at(simd, cells.steps(simd, aabb).0);
+        let takes = simd.fits(&cells.max_extent, aabb);
+        let mut key = simd.key(cells.dims, cells.shift, cells.wraps, cells.steps(simd, aabb).0);
         let mut bucket = 0;
         if takes {
             bucket += (key >> shift) as usize;
@@ -208,7 +204,6 @@ fn count_keys(
     }
 }
 
-/// Copies boxes to the next places of their buckets.
 #[inline(always)]
 fn scatter_records(
     _: impl Simd,
@@ -229,7 +224,6 @@ fn scatter_records(
     }
 }
 
-/// The slots and cells of a bucket.
 struct SortedBucket<'a> {
     first_key: usize,
     first_slot: usize,

@@ -3,8 +3,8 @@
 //! An axis is divided into *steps*, a few dozen to a cell. Every coordinate is rounded to a step once, in f64; cells and
 //! codes come from that integer alone (contract 3). Rounding is monotone, so boxes that overlap also overlap in steps.
 
-use crate::Aabb;
 use crate::simd::{Simd, Steps};
+use crate::{Aabb, NeighbourScan};
 
 /// Maximum extent in steps of a box in the grid. With one step of rounding at each end two such boxes
 /// that overlap differ by at most 2 * (62 + 2) < 256 steps, which the nine bits of a code can tell from "apart".
@@ -27,22 +27,12 @@ pub(crate) struct Cells {
     pub(super) dims: [i32; 3],
     /// True if the cells wrap around: the first cell follows the last. Otherwise boxes beyond the border lie in the border cells.
     pub(super) wraps: bool,
+    pub(super) scan: NeighbourScan,
 }
 
 impl Cells {
-    /// Returns the number of cells.
     pub(crate) fn count(&self) -> usize {
         self.dims.iter().map(|&dim| dim as usize).product()
-    }
-
-    /// Returns the cells by axis.
-    pub(crate) fn dims(&self) -> [u32; 3] {
-        self.dims.map(|dim| dim as u32)
-    }
-
-    /// Returns the lower corner of the first cell.
-    pub(crate) fn origin(&self) -> [f64; 3] {
-        [self.origin[0], self.origin[1], self.origin[2]]
     }
 
     /// Returns the edges of a cell, in the boxes' unit.
@@ -50,22 +40,9 @@ impl Cells {
         std::array::from_fn(|k| (f64::from(1u32 << self.shift) / self.scale[k]) as f32)
     }
 
-    /// Returns true for a valid box that is not oversize.
-    #[inline(always)]
-    pub(super) fn takes(&self, simd: impl Simd, aabb: &Aabb) -> bool {
-        simd.fits(&self.max_extent, aabb)
-    }
-
-    /// Returns both corners of a box in steps.
     #[inline(always)]
     pub(super) fn steps(&self, simd: impl Simd, aabb: &Aabb) -> (Steps, Steps) {
         simd.steps(&self.origin, &self.scale, aabb)
-    }
-
-    /// Returns the key of the cell of a point: clamped into the grid, or wrapped around.
-    #[inline(always)]
-    pub(super) fn key_at(&self, simd: impl Simd, point: Steps) -> u32 {
-        simd.key(self.dims, self.shift, self.wraps, point)
     }
 
     /// Returns the key of a cell: its number, row by row.

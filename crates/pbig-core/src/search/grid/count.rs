@@ -32,7 +32,6 @@ impl Sorted<'_> {
         !budget.is_over()
     }
 
-    /// Returns the work of an oversize box.
     fn most_of_oversize(&self, i: usize) -> u64 {
         let (one, grid, others) = self.oversize(i);
         let mut work = others.len() as u64 * WORK_OF_EXACT_TEST;
@@ -48,7 +47,7 @@ impl Sorted<'_> {
 #[inline(always)]
 fn count_slots(simd: impl Simd, sorted: &Sorted<'_>, slots: Range<usize>) -> u64 {
     let grid = sorted.searched();
-    let of_slot = |slot: usize| match (sorted.other, grid.plan.scan, grid.plan.cells.wraps) {
+    let of_slot = |slot: usize| match (sorted.other, grid.cells.scan, grid.cells.wraps) {
         (None, NeighbourScan::Runs, _) => WORK_OF_RUNS + WORK_OF_VAGUE_TEST * in_runs(grid, slot),
         (_, _, false) => in_window::<false>(simd, sorted, slot),
         (_, _, true) => in_window::<true>(simd, sorted, slot),
@@ -59,8 +58,7 @@ fn count_slots(simd: impl Simd, sorted: &Sorted<'_>, slots: Range<usize>) -> u64
 /// Returns the slots behind a box in its own row of cells, and in four rows more.
 #[inline(always)]
 fn in_runs(grid: &Grid, slot: usize) -> u64 {
-    let (dx, layer) =
-        (grid.plan.cells.dims[0] as usize, (grid.plan.cells.dims[0] * grid.plan.cells.dims[1]) as usize);
+    let (dx, layer) = (grid.cells.dims[0] as usize, (grid.cells.dims[0] * grid.cells.dims[1]) as usize);
     let key = grid.records[slot].key as usize;
     let row = |first: usize| u64::from(grid.starts[first + 3] - grid.starts[first]);
     let own = u64::from(grid.starts[key + 2]) - slot as u64;
@@ -71,7 +69,7 @@ fn in_runs(grid: &Grid, slot: usize) -> u64 {
 #[inline(always)]
 fn in_window<const WRAPS: bool>(simd: impl Simd, sorted: &Sorted<'_>, slot: usize) -> u64 {
     let grid = sorted.searched();
-    let cells = &grid.plan.cells;
+    let cells = &grid.cells;
     let (low, high) = cells.steps(simd, &sorted.own.records[slot].aabb);
     let window = cells.window(low, high);
     let mut work = 0;

@@ -18,10 +18,10 @@ mod spacing;
 mod tests;
 
 pub(super) use build::TwoGrids;
+pub(crate) use cells::Cells;
 pub(crate) use occupied::occupied_cells;
-pub(crate) use spacing::GridPlan;
 
-use super::record::Record;
+use super::hits::Record;
 use crate::memory::{Scratch, ShrinkingVec};
 use crate::simd::BLOCK;
 use build::BucketCounts;
@@ -29,7 +29,7 @@ use build::BucketCounts;
 /// A grid with its buffers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Grid {
-    pub(crate) plan: GridPlan,
+    pub(crate) cells: Cells,
     /// By slot, sorted by cell; where boxes stay in buckets, by bucket. Longer than `len`.
     records: ShrinkingVec<Record>,
     /// By slot; tombstones beyond `len`, so that a block can be read anywhere. While the
@@ -50,10 +50,9 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Gives back memory that a build since the last call did not need.
     pub(crate) fn settle(&mut self) {
         let room = std::mem::take(&mut self.room);
-        let cells = if room > 0 { self.starts.len().min(self.plan.cells.count() + 4) } else { 0 };
+        let cells = if room > 0 { self.starts.len().min(self.cells.count() + 4) } else { 0 };
         self.records.settle(room);
         self.coarse.settle(room);
         self.codes.settle(room + 2 * BLOCK);

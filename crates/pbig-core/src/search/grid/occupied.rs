@@ -1,15 +1,14 @@
 //! The occupied cells of a grid, for pictures.
 
-use super::Grid;
-use super::spacing::GridPlan;
+use super::{Cells, Grid};
 use crate::simd::Portable;
 use crate::{Aabb, OccupiedCell};
 
 /// Sorts boxes into a grid, and returns the cells in which some lie.
 pub(crate) fn occupied_cells(boxes: &[Aabb]) -> Vec<OccupiedCell> {
-    let (plan, mut grid) = (GridPlan::new(boxes, None, 1), Grid::default());
-    grid.build(plan, boxes, 1);
-    (0..plan.cells.count()).filter_map(|key| grid.occupied_cell(key)).collect()
+    let (cells, mut grid) = (Cells::new(boxes, None, 1), Grid::default());
+    grid.build(cells, boxes, 1);
+    (0..cells.count()).filter_map(|key| grid.occupied_cell(key)).collect()
 }
 
 impl Grid {
@@ -24,7 +23,7 @@ impl Grid {
 
     /// Returns the cell in which the lower corner of a box lies.
     fn cell_around(&self, aabb: &Aabb) -> Aabb {
-        let cells = &self.plan.cells;
+        let cells = &self.cells;
         let (low, _) = cells.steps(Portable, aabb);
         let edge = cells.edges();
         let min: [f32; 3] = std::array::from_fn(|k| {

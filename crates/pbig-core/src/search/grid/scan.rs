@@ -7,8 +7,7 @@ use crate::Aabb;
 use crate::NeighbourScan;
 use crate::parallel::run_with;
 use crate::policy::search::{WORK_OF_ROW, WORK_OF_RUNS};
-use crate::search::hits::{CHARGED_FROM, HIT_ROOM, HitWriter, Hits, Rule};
-use crate::search::record::Record;
+use crate::search::hits::{CHARGED_FROM, HIT_ROOM, HitWriter, Hits, Record, Rule};
 use crate::simd::{BLOCK, Simd, dispatch};
 use crate::simd::{Portable, query_of};
 use std::ops::Range;
@@ -33,17 +32,14 @@ pub(crate) struct Sorted<'a> {
 type Oversize<'a> = (&'a Record, &'a Grid, &'a [Record]);
 
 impl<'a> Sorted<'a> {
-    /// Returns the grid that is searched.
     pub(super) fn searched(&self) -> &'a Grid {
         self.other.unwrap_or(self.own)
     }
 
-    /// Returns the number of boxes.
     pub(crate) fn boxes(&self) -> usize {
         self.own.len + self.other.map_or(0, |other| other.len) + self.oversize_count()
     }
 
-    /// Returns the number of oversize boxes.
     pub(crate) fn oversize_count(&self) -> usize {
         self.own.oversize.len() + self.other.map_or(0, |other| other.oversize.len())
     }
@@ -64,7 +60,10 @@ impl<'a> Sorted<'a> {
         let in_grid = len.div_ceil(PIECE);
         run_with(hits, in_grid + oversize.div_ceil(OVERSIZE_PIECE), |hits, i| {
             if i < in_grid {
-                self.search_slots(i * PIECE..len.min((i + 1) * PIECE), rule, hits);
+                let slots = i * PIECE..len.min((i + 1) * PIECE);
+                if !hits.is_full {
+                    dispatch!(search_piece, self, slots.clone(), rule, hits);
+                }
                 return hits.charge(rule.budget);
             }
             let first = (i - in_grid) * OVERSIZE_PIECE;
@@ -72,14 +71,6 @@ impl<'a> Sorted<'a> {
         });
     }
 
-    /// Finds the pairs of the boxes in some slots.
-    fn search_slots(&self, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
-        if !hits.is_full {
-            dispatch!(search_piece, self, slots.clone(), rule, hits);
-        }
-    }
-
-    /// Finds the pairs of an oversize box.
     fn search_oversize(&self, i: usize, rule: &Rule<'_>, hits: &mut Hits) {
         if hits.is_full {
             return;
@@ -115,8 +106,8 @@ fn search_piece(simd: impl Simd, sorted: &Sorted<'_>, slots: Range<usize>, rule:
     let mut blocks = [0; HIT_ROOM];
     let writer = HitWriter::new(&mut blocks);
     let (own, grid) = (sorted.own, sorted.searched());
-    let mut scan = Scan { simd, cells: grid.plan.cells, own, grid, rule, hits, writer };
-    match (sorted.other, grid.plan.scan, grid.plan.cells.wraps) {
+    let mut scan = Scan { simd, cells: grid.cells, own, grid, rule, hits, writer };
+    match (sorted.other, grid.cells.scan, grid.cells.wraps) {
         (None, NeighbourScan::Runs, _) => scan.runs(slots),
         (None, NeighbourScan::Windows, false) => scan.windows::<false>(slots),
         (None, NeighbourScan::Windows, true) => scan.windows::<true>(slots),
@@ -314,7 +305,6 @@ impl<S: Simd> Scan<'_, '_, S> {
         unsafe { self.few(one, runs) };
     }
 
-    /// Tests a row of cells.
     #[inline(always)]
     fn row(&mut self, one: Seeker, row: [KeyRun; 2]) {
         self.writer.rows += WORK_OF_ROW;
@@ -343,7 +333,7 @@ impl Grid {
 
     /// Visits the cells in which boxes can lie that overlap a box of any size.
     pub(super) fn reached_by(&self, aabb: &Aabb, mut visit: impl FnMut(KeyRun)) {
-        let cells = &self.plan.cells;
+        let cells = &self.cells;
         let (low, high) = cells.steps(Portable, aabb);
         let window = cells.window(low, high).clipped(cells);
         for z in window.low[2]..=window.high[2] {

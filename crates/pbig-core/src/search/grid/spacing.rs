@@ -5,22 +5,15 @@ use super::cells::{Cells, MAX_STEPS_PER_BOX};
 use crate::policy;
 use crate::{Aabb, Algorithm, NeighbourScan, Plan};
 
-/// A grid to be built.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct GridPlan {
-    pub(crate) cells: Cells,
-    pub(crate) scan: NeighbourScan,
-}
-
-impl GridPlan {
-    /// Describes a search of the grid, or of two with this plan.
+impl Cells {
+    /// Describes a search of one grid of these cells, or of two.
     pub(crate) fn told(&self, boxes: usize, oversize: usize) -> Plan {
         Plan {
             algorithm: Algorithm::Grid,
             boxes: boxes as u32,
-            origin: self.cells.origin(),
-            cell: self.cells.edges(),
-            dims: self.cells.dims(),
+            origin: std::array::from_fn(|k| self.origin[k]),
+            cell: self.edges(),
+            dims: self.dims.map(|dim| dim as u32),
             scan: self.scan,
             oversize: oversize as u32,
             ..Plan::default()
@@ -126,7 +119,6 @@ impl Spacing {
         (0..3).any(|k| self.edge / 64.0 > f64::from(self.extent[k]) / (MAX_STEPS_PER_BOX - 1.0))
     }
 
-    /// Returns the number of cells that the space has on an axis.
     fn cells_along(&self, k: usize) -> f64 {
         self.space.width(k) / (64.0 * self.step(k)) + 1.0
     }
@@ -168,7 +160,7 @@ impl Spacing {
         if others < policy::MIN_COINCIDENCES { 0.0 } else { others as f64 / n * (self.boxes as f64 / n) }
     }
 
-    fn plan(&self, is_of_two_sets: bool, sample: &Sample) -> GridPlan {
+    fn plan(&self, is_of_two_sets: bool, sample: &Sample) -> Cells {
         let per_cell = self.boxes as f64 / (0..3).map(|k| self.cells_along(k)).product::<f64>();
         let is_crowded = self.wraps || per_cell > policy::RUNS_UP_TO_PER_CELL;
         let is_sparse = per_cell <= policy::LONG_CELLS_UP_TO_PER_CELL && self.crowd(sample) == 0.0;
@@ -187,11 +179,12 @@ impl Spacing {
         if self.wraps {
             cells.dims = wrapped_dims(cells.dims, self.most_cells());
         }
-        let scan = if is_crowded || is_of_two_sets { NeighbourScan::Windows } else { NeighbourScan::Runs };
-        GridPlan { cells, scan }
+        if is_crowded || is_of_two_sets {
+            cells.scan = NeighbourScan::Windows;
+        }
+        cells
     }
 
-    /// Returns log2 of the steps in a cell.
     fn shift(&self, has_long_cells: bool) -> u32 {
         if self.wraps {
             // Cells that fold onto one place hold fewer boxes.

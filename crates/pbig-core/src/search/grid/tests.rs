@@ -1,14 +1,12 @@
 //! Cells and codes never lose an overlapping pair, and every implementation of the inner loops gives the same values.
 
 use super::cells::Cells;
-use super::spacing::GridPlan;
 use crate::Aabb;
 use crate::simd::query_of;
 use crate::simd::{BLOCK, EightBoxes, Portable, Simd, dispatch};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
-/// All that the inner loops compute of a box.
 #[derive(Debug, PartialEq)]
 struct Values {
     takes: bool,
@@ -18,7 +16,8 @@ struct Values {
 
 fn values(simd: impl Simd, cells: &Cells, aabb: &Aabb) -> Values {
     let (low, high) = cells.steps(simd, aabb);
-    Values { takes: cells.takes(simd, aabb), key: cells.key_at(simd, low), code: simd.code(low, high) }
+    let key = simd.key(cells.dims, cells.shift, cells.wraps, low);
+    Values { takes: simd.fits(&cells.max_extent, aabb), key, code: simd.code(low, high) }
 }
 
 fn may_overlap(simd: impl Simd, code: u64, codes: &[u64; BLOCK]) -> u32 {
@@ -44,7 +43,7 @@ fn overlapping_boxes_have_codes_that_may_overlap() {
     let mut met = [0; 2];
     for round in 0..12 {
         let boxes = random_boxes(&mut random, [1, 3][round % 2]);
-        let cells = GridPlan::new(&boxes, None, 1).cells;
+        let cells = Cells::new(&boxes, None, 1);
         let values: Vec<Values> = boxes.iter().map(|aabb| dispatch!(values, &cells, aabb)).collect();
         for (i, one) in boxes.iter().enumerate().filter(|(i, _)| values[*i].takes) {
             for (j, other) in boxes.iter().enumerate().filter(|(j, _)| values[*j].takes) {
@@ -64,7 +63,7 @@ fn every_implementation_computes_the_same_values() {
     let infinite = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
     for clusters in [1, 3] {
         let mut boxes = random_boxes(&mut random, clusters);
-        let cells = GridPlan::new(&boxes, None, 1).cells;
+        let cells = Cells::new(&boxes, None, 1);
         boxes.extend([Aabb::NOWHERE, infinite, Aabb::new([f32::MAX; 3], [f32::MIN; 3])]);
         for aabb in &boxes {
             assert_eq!(dispatch!(values, &cells, aabb), values(Portable, &cells, aabb), "{aabb:?}");
