@@ -32,6 +32,7 @@ impl LookUp {
         };
         index.in_order(&world.changed, &mut self.order);
         task.kept.make_backward();
+        drop_pairs_of_removed(&world.removed, task.kept);
         task.report.stages.map += clock.lap();
         stage!("check");
         let is_forced = task.config.engine == Some(Engine::LookUp);
@@ -75,16 +76,27 @@ impl LookUp {
         for thread in &self.threads {
             events.added.extend_from_slice(&thread.added);
             events.removed.extend_from_slice(&thread.removed);
-            events.dropped.extend_from_slice(&thread.dropped);
         }
         events.sort(ids);
     }
 
     pub(super) fn settle(&mut self) {
-        for Thread { added, removed, dropped, .. } in &mut self.threads {
-            [added, removed, dropped].into_iter().for_each(ShrinkingVec::settle_and_clear);
+        for Thread { added, removed, .. } in &mut self.threads {
+            [added, removed].into_iter().for_each(ShrinkingVec::settle_and_clear);
         }
     }
+}
+
+/// Drops the kept pairs of removed boxes, which end without an event.
+fn drop_pairs_of_removed(removed: &[u32], kept: &mut Kept) {
+    let partners = |id: u32| {
+        let (lower, later) = kept.rows_of(id);
+        lower.iter().chain(later).map(move |&other| Pair::new(id, other))
+    };
+    let mut dropped: Vec<Pair> = removed.iter().flat_map(|id| partners(*id)).collect();
+    dropped.sort_unstable();
+    dropped.dedup();
+    kept.apply(&[], &dropped);
 }
 
 /// The findings and buffers of one thread.
@@ -95,7 +107,6 @@ struct Thread {
     was: Vec<u32>,
     added: ShrinkingVec<Pair>,
     removed: ShrinkingVec<Pair>,
-    dropped: ShrinkingVec<Pair>,
     nodes: u64,
     met: u64,
 }
@@ -104,7 +115,6 @@ impl Thread {
     fn clear(&mut self) {
         self.added.clear();
         self.removed.clear();
-        self.dropped.clear();
         (self.nodes, self.met) = (0, 0);
     }
 
@@ -148,8 +158,7 @@ impl Thread {
         let at = self.now.partition_point(|other| *other < id);
         let behind = at + usize::from(self.now.get(at) == Some(&id));
         let is_same = equal(lower, &self.now[..at]) && equal(later, &self.now[behind..]);
-        let was_removed = |other: &u32| world.was_removed(*other);
-        if !is_same || world.has_removed() && (was_removed(&id) || self.now.iter().any(was_removed)) {
+        if !is_same {
             self.compare_all(world, (lower, later), id);
         }
     }
@@ -157,16 +166,11 @@ impl Thread {
     /// Notes the differences. The changed box with the lower id reports a pair of two changed boxes.
     #[inline(never)]
     fn compare_all(&mut self, world: &World, (lower, later): (&[u32], &[u32]), id: u32) {
-        let Self { now, was, added, removed, dropped, .. } = self;
+        let Self { now, was, added, removed, .. } = self;
         let is_own = |other: u32| other > id || other < id && !world.has_changed(other);
         now.retain(|other| is_own(*other));
         was.clear();
         was.extend(lower.iter().chain(later).copied().filter(|other| is_own(*other)));
-        if world.has_removed() {
-            let ended = |other: u32| world.was_removed(id) || world.was_removed(other);
-            dropped.extend(was.iter().filter(|other| ended(**other)).map(|&other| Pair::new(id, other)));
-            was.retain(|&other| !ended(other));
-        }
         differences(id, was, now, added, removed);
     }
 }

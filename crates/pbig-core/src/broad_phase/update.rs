@@ -107,22 +107,20 @@ impl BroadPhase {
             return Ok(());
         }
         let mut clock = Clock::start();
-        let events = &self.comparison;
-        let gone = events.removed.len() + events.dropped.len();
+        let Comparison { added, removed, .. } = &*self.comparison;
         let limit = self.config.limits.pairs();
-        if (self.kept.len() + events.added.len() - gone) as u64 > limit {
+        if (self.kept.len() + added.len() - removed.len()) as u64 > limit {
             return Err(Error::TooManyPairs { limit });
         }
-        self.kept.apply(&[], &events.dropped);
-        self.kept.apply(&events.added, &events.removed);
+        self.kept.apply(added, removed);
         self.report.stages.diff += clock.lap();
         Ok(())
     }
 
     /// Gives back a piece of the memory that a peak has left.
     fn settle(&mut self) {
-        let Comparison { added, removed, dropped, .. } = &*self.comparison;
-        let (pairs, events) = (self.kept.len(), added.len() + removed.len() + dropped.len());
+        let Comparison { added, removed, .. } = &*self.comparison;
+        let (pairs, events) = (self.kept.len(), added.len() + removed.len());
         self.look_up.settle();
         self.search.settle(pairs);
         self.comparison.settle(events);

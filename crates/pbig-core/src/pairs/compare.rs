@@ -16,8 +16,6 @@ const RADIX_BITS: u32 = 11;
 pub(crate) struct Comparison {
     pub(crate) added: ShrinkingVec<Pair>,
     pub(crate) removed: ShrinkingVec<Pair>,
-    /// Kept pairs of removed boxes, which end without an event.
-    pub(crate) dropped: ShrinkingVec<Pair>,
     /// True if the found pairs have replaced the kept ones. Otherwise the events have to be applied to these.
     pub(crate) is_kept: bool,
     /// By group.
@@ -98,20 +96,19 @@ impl Comparison {
     pub(crate) fn settle(&mut self, events: usize) {
         let parts = self.parts.iter_mut().flat_map(|part| [&mut part.added, &mut part.removed]);
         parts.for_each(ShrinkingVec::settle_and_clear);
-        let lists = [&mut self.added, &mut self.removed, &mut self.dropped, &mut self.sorted];
+        let lists = [&mut self.added, &mut self.removed, &mut self.sorted];
         lists.into_iter().for_each(|list| list.settle(events));
     }
 
     pub(crate) fn clear(&mut self) {
         self.added.clear();
         self.removed.clear();
-        self.dropped.clear();
         self.is_kept = false;
     }
 
     pub(crate) fn sort(&mut self, ids: usize) {
-        let Self { added, removed, dropped, sorted, counts, .. } = self;
-        for events in [added, removed, dropped] {
+        let Self { added, removed, sorted, counts, .. } = self;
+        for events in [added, removed] {
             sort(events, sorted, counts, ids);
         }
     }

@@ -5,43 +5,27 @@ use super::{BLOCK, Eight, Simd, lanewise};
 use crate::Aabb;
 use crate::aabb::sse::corners;
 use std::arch::x86_64::*;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::OnceLock;
 
 /// A proof that the processor has the instructions, because only [`Avx2::detect`] makes one. Four codes lie in a register of 256 bits.
 /// (512 bits were slower on Zen 4: every other load crosses a cache line.)
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(());
 
-/// The processor's answer: 0 before it was asked.
-static FOUND: AtomicU8 = AtomicU8::new(0);
-
-struct Found;
-
-impl Found {
-    const YES: u8 = 1;
-    const NO: u8 = 2;
-}
+/// The processor's answer: asked once, because the library's takes five loads and tests.
+static HAS_ALL: OnceLock<bool> = OnceLock::new();
 
 impl Avx2 {
     /// Returns a proof if the processor has all instructions that its `run` enables.
     #[inline(always)]
     pub(crate) fn detect() -> Option<Self> {
-        match FOUND.load(Ordering::Relaxed) {
-            Found::YES => Some(Self(())),
-            Found::NO => None,
-            _ => Self::look(),
-        }
-    }
-
-    /// Asks the processor, once: the library's answer takes five loads and tests.
-    #[cold]
-    fn look() -> Option<Self> {
-        let has_all = is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("popcnt")
-            && is_x86_feature_detected!("lzcnt");
-        FOUND.store(if has_all { Found::YES } else { Found::NO }, Ordering::Relaxed);
+        let has_all = HAS_ALL.get_or_init(|| {
+            is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("popcnt")
+                && is_x86_feature_detected!("lzcnt")
+        });
         has_all.then_some(Self(()))
     }
 }
