@@ -39,7 +39,7 @@ impl LookUp {
         let most = if is_forced { u64::MAX } else { policy::look_up_to_nodes(world.present.len()) };
         let budget = Budget::new(most);
         self.look_up((world, task.kept, index), &budget);
-        self.gather(task.events, world.ids());
+        self.gather(task.events);
         let sum = |of: fn(&Thread) -> u64| self.threads.iter().map(of).sum::<u64>();
         let (mut nodes, mut met) = (sum(|thread| thread.nodes), sum(|thread| thread.met));
         if budget.is_over() {
@@ -71,13 +71,13 @@ impl LookUp {
         });
     }
 
-    fn gather(&self, events: &mut Comparison, ids: usize) {
+    fn gather(&self, events: &mut Comparison) {
         events.clear();
         for thread in &self.threads {
             events.added.extend_from_slice(&thread.added);
             events.removed.extend_from_slice(&thread.removed);
         }
-        events.sort(ids);
+        events.sort();
     }
 
     pub(super) fn settle(&mut self) {

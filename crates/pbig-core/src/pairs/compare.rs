@@ -5,11 +5,8 @@ use super::kept::{Kept, Rows};
 use super::row::{self, equal};
 use crate::Pair;
 use crate::memory::ShrinkingVec;
-use crate::parallel::{ensure_scratch, run_parts_with, split_into};
+use crate::parallel::{run_parts_with, split_into};
 use crate::simd::{Simd, dispatch};
-
-/// Bits of `a` by which many events are sorted roughly before each part is sorted.
-const RADIX_BITS: u32 = 11;
 
 /// The result of a comparison. `added` and `removed` are sorted.
 #[derive(Clone, Debug, Default)]
@@ -20,9 +17,6 @@ pub(crate) struct Comparison {
     pub(crate) is_kept: bool,
     /// By group.
     parts: Vec<Part>,
-    /// Buffers of a sort.
-    sorted: ShrinkingVec<Pair>,
-    counts: Vec<u32>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -96,8 +90,8 @@ impl Comparison {
     pub(crate) fn settle(&mut self, events: usize) {
         let parts = self.parts.iter_mut().flat_map(|part| [&mut part.added, &mut part.removed]);
         parts.for_each(ShrinkingVec::settle_and_clear);
-        let lists = [&mut self.added, &mut self.removed, &mut self.sorted];
-        lists.into_iter().for_each(|list| list.settle(events));
+        self.added.settle(events);
+        self.removed.settle(events);
     }
 
     pub(crate) fn clear(&mut self) {
@@ -106,11 +100,10 @@ impl Comparison {
         self.is_kept = false;
     }
 
-    pub(crate) fn sort(&mut self, ids: usize) {
-        let Self { added, removed, sorted, counts, .. } = self;
-        for events in [added, removed] {
-            sort(events, sorted, counts, ids);
-        }
+    pub(crate) fn sort(&mut self) {
+        let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
+        self.added.sort_unstable_by_key(word);
+        self.removed.sort_unstable_by_key(word);
     }
 
     fn gather(&mut self) {
@@ -146,62 +139,6 @@ impl Part {
             let start = (span.start - new.first_place) as usize;
             let (was, is) = (old.spans[a as usize].range(), start..start + span.len as usize);
             row::compare(simd, a, (&old.pool, was), (new.pool, is), (&mut part.added, &mut part.removed));
-        }
-    }
-}
-
-/// Sorts pairs by the highest bits of `a`, into `to`.
-fn sort_roughly(pairs: &[Pair], to: &mut Vec<Pair>, counts: &mut Vec<u32>, ids: usize) {
-    let shift = (usize::BITS - ids.leading_zeros()).saturating_sub(RADIX_BITS);
-    ensure_scratch(to, pairs.len(), Pair::default());
-    counts.clear();
-    counts.resize(1 << RADIX_BITS, 0);
-    pairs.iter().for_each(|pair| counts[(pair.a >> shift) as usize] += 1);
-    let mut next = 0;
-    for count in counts.iter_mut() {
-        next += std::mem::replace(count, next);
-    }
-    for pair in pairs {
-        let place = &mut counts[(pair.a >> shift) as usize];
-        to[*place as usize] = *pair;
-        *place += 1;
-    }
-}
-
-/// Sorts pairs: roughly by `a` first if they are many.
-fn sort(pairs: &mut ShrinkingVec<Pair>, sorted: &mut ShrinkingVec<Pair>, counts: &mut Vec<u32>, ids: usize) {
-    let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
-    if pairs.len() < 1 << RADIX_BITS {
-        return pairs.sort_unstable_by_key(word);
-    }
-    sort_roughly(pairs, sorted, counts, ids);
-    sorted.truncate(pairs.len());
-    std::mem::swap(pairs, sorted);
-    let mut start = 0;
-    for &end in &*counts {
-        pairs[start..end as usize].sort_unstable_by_key(word);
-        start = end as usize;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn many_events_are_sorted_whatever_the_number_of_ids() {
-        let (mut sorted, mut counts) = (ShrinkingVec::default(), vec![]);
-        for ids in [2047, 2048, 2049, (1 << 20) - 1, 1 << 20, (1 << 20) + 1] {
-            for len in [0, 10, 2047, 2048, 5000] {
-                let id = |i: u64| (i * 0x9E37_79B9 % ids) as u32;
-                let mut pairs = ShrinkingVec::default();
-                pairs.extend((0..len).map(|i| Pair::new(id(i), id(i + len))));
-                pairs.push(Pair { a: ids as u32 - 2, b: ids as u32 - 1 });
-                let mut wanted = pairs.to_vec();
-                wanted.sort_unstable();
-                sort(&mut pairs, &mut sorted, &mut counts, ids as usize);
-                assert_eq!(*pairs, wanted, "{len} pairs of {ids} ids");
-            }
         }
     }
 }
