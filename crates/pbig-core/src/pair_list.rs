@@ -237,20 +237,6 @@ mod tests {
     }
 
     #[test]
-    fn parts_are_in_order_together_if_their_border_is() {
-        let pairs = many();
-        let boxes = BoxIds::First(end_of(&pairs));
-        let (first, second) = pairs.split_at(PIECE + 5);
-        for (parts, is_in_order) in
-            [([first, second], true), ([second, first], false), ([first, first], false)]
-        {
-            let mut list = PairList::default();
-            parts.iter().for_each(|part| list.append_checked(part, boxes).expect("pairs"));
-            assert_eq!(list.is_in_order(), is_in_order);
-        }
-    }
-
-    #[test]
     fn a_changed_list_is_checked_again() {
         let mut list = PairList::default();
         list.append_checked(&many(), BoxIds::First(u32::MAX)).expect("pairs");

@@ -57,11 +57,14 @@ impl Search {
     /// The next searches begin with streamed segment trees, as after grids and trees that took too much work.
     #[cfg(test)]
     pub(super) fn give_up_grids_and_trees(&mut self) {
-        (0..4).for_each(|_| self.store.note_given_up());
+        for _ in 0..4 {
+            self.store.grids.note(true, 0);
+            self.store.trees.note(true, 0);
+        }
     }
 
     pub(super) fn settle(&mut self, pairs: usize) {
-        self.store.settle();
+        self.store.grid.settle();
         self.all_pairs.settle(pairs);
         self.groups.settle(pairs);
     }
@@ -120,7 +123,7 @@ impl Listed {
 /// Drops the kept pairs of boxes that were removed since the last update. Boxes left after a peak are few, so it reads their rows only.
 fn drop_pairs_of_removed(world: &World, kept: &mut Kept) {
     let absent = world.removed.iter().copied().filter(|id| !world.contains(*id));
-    let pairs = |a: u32| kept.later_partners(a).iter().map(move |&b| Pair { a, b });
+    let pairs = |a: u32| kept.rows_of(a).1.iter().map(move |&b| Pair { a, b });
     let has_ended = |pair: &Pair| world.was_removed(pair.a) || world.was_removed(pair.b);
     let all = world.present.iter().chain(absent).flat_map(pairs);
     let mut dropped: Vec<Pair> = all.filter(has_ended).collect();

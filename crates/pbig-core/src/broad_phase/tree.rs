@@ -38,13 +38,6 @@ struct Stale {
     knows_changes: bool,
 }
 
-impl Clone for Tree {
-    /// Returns an empty tree: the clone makes its own when it needs one.
-    fn clone(&self) -> Self {
-        Self::default()
-    }
-}
-
 impl Tree {
     #[inline(always)]
     pub(super) fn expire(&mut self) {

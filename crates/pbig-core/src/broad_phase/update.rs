@@ -4,7 +4,7 @@ use super::tree::Tree;
 use super::{BroadPhase, Events, Task};
 use crate::pairs::Comparison;
 use crate::policy;
-use crate::report::Clock;
+use crate::report::{Clock, Report};
 use crate::{Backend, Engine, Error, Plan};
 
 impl BroadPhase {
@@ -128,17 +128,16 @@ impl BroadPhase {
     }
 
     fn begin_report(&mut self) {
-        let present = self.world.present.len() as u64;
-        let report = &mut self.report;
-        (report.stages, report.checks, report.work) = Default::default();
-        report.boxes = present;
-        report.invalid = present - u64::from(self.world.valid);
-        report.changed = self.world.changed.len() as u64;
-        report.plan = Plan { boxes: self.world.valid, ..Plan::default() };
-        report.device = None;
+        let (boxes, valid) = (self.world.present.len() as u64, self.world.valid);
         // A backend that was asked for stays unavailable until a call on it succeeds.
-        if self.config.backend != Backend::Device {
-            report.fallback = None;
-        }
+        let fallback = self.report.fallback.take().filter(|_| self.config.backend == Backend::Device);
+        self.report = Report {
+            boxes,
+            invalid: boxes - u64::from(valid),
+            changed: self.world.changed.len() as u64,
+            plan: Plan { boxes: valid, ..Plan::default() },
+            fallback,
+            ..Report::default()
+        };
     }
 }

@@ -3,6 +3,7 @@
 use super::tree::Tree;
 use crate::aabb::one_box;
 use crate::id_set::IdSet;
+use crate::memory::Scratch;
 use crate::parallel::{run_parts, split_into, threads_for};
 use crate::{Aabb, ProxyFilter};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -38,7 +39,8 @@ pub(crate) struct World {
     pub(super) valid: u32,
     /// Boxes that were ever given a filter other than [`ProxyFilter::ALL`].
     pub(super) is_filtered: bool,
-    pub(super) tree: Tree,
+    /// A clone makes its own when it needs one.
+    pub(super) tree: Scratch<Tree>,
 }
 
 impl World {
@@ -222,7 +224,7 @@ impl World {
         self.changed.shrink_to_fit();
         self.removed.shrink_to_fit();
         self.present.shrink();
-        self.tree = Tree::default();
+        self.tree = Scratch::default();
     }
 }
 

@@ -44,7 +44,9 @@ impl BoxIndex {
         if !self.wants_sort() && !self.has_many_loose() {
             return read;
         }
-        let is_sorted = self.is_sorted || self.has_earned_sort();
+        // Queries may have looked at as many nodes as a sort costs.
+        let one = policy::nodes_for_sort(self.leaves, self.listed);
+        let is_sorted = self.is_sorted || self.looked_at.0.load(Ordering::Relaxed) >= one;
         self.lay_out(boxes, present, is_sorted.then_some(Order::SORTED));
         read + self.listed
     }
@@ -170,11 +172,6 @@ impl BoxIndex {
             (false, true) => Some(policy::SORTS_FOR_ORDER * one),
             (false, false) => None,
         };
-    }
-
-    /// Returns true if queries have looked at as many nodes as a sort costs.
-    fn has_earned_sort(&self) -> bool {
-        self.looked_at.0.load(Ordering::Relaxed) >= policy::nodes_for_sort(self.leaves, self.listed)
     }
 
     /// Sorts the boxes as they are now.

@@ -40,7 +40,9 @@ impl Sets {
     pub(super) fn take(&mut self, sets: [&Boxes<'_>; 2]) {
         let [a, b] = sets.map(|set| set.boxes);
         // A few boxes are tested against the others sooner than these are looked at.
-        self.are_copied = a.len().min(b.len()) > FEW_BOXES && !are_near(a, b);
+        let are_few = a.len().min(b.len()) <= FEW_BOXES;
+        let seem_near = |set, other| seem_near(set, &bounds_of_valid(other));
+        self.are_copied = !(are_few || seem_near(a, b) && seem_near(b, a));
         self.dropped = 0;
         self.copies.iter_mut().zip(sets).for_each(|(copies, set)| copies.len = set.boxes.len());
         if self.are_copied {
@@ -149,11 +151,6 @@ impl Copies {
             boxes.iter_mut().zip(ids).for_each(|(to, id)| *to = set[*id as usize]);
         });
     }
-}
-
-/// Returns true if the boxes of each set seem to overlap the bounds of the other one.
-fn are_near(a: &[Aabb], b: &[Aabb]) -> bool {
-    seem_near(a, &bounds_of_valid(b)) && seem_near(b, &bounds_of_valid(a))
 }
 
 /// Returns true if a sample of a set is valid, and overlaps a box.

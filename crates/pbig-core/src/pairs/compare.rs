@@ -79,7 +79,7 @@ impl Comparison {
             while let Some(pair) = found.next_if(|pair| pair.a == a) {
                 is.push(pair.b);
             }
-            let was = kept.later_partners(a);
+            let was = kept.rows_of(a).1;
             if !equal(was, &is) {
                 row::differences(a, was, &is, &mut self.added, &mut self.removed);
             }

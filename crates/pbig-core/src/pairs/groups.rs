@@ -112,22 +112,21 @@ pub(crate) struct Groups {
 }
 
 impl Groups {
-    /// Gathers the pairs that threads have found and counted by this grouping, and returns their number. `of` returns those of a thread.
+    /// Gathers the pairs that threads have found and counted by this grouping. `of` returns those of a thread.
     pub(crate) fn gather<T: Send>(
         &mut self,
         grouping: Grouping,
-        (threads, of): (&mut [T], fn(&mut T) -> &mut Found),
-        workers: usize,
-    ) -> usize {
+        threads: &mut [T],
+        of: fn(&mut T) -> &mut Found,
+    ) {
         self.grouping = grouping;
-        let count = self.place((threads, of));
+        let count = self.place(threads, of);
         if let ([one], 1) = (&mut *threads, grouping.count) {
-            std::mem::swap(&mut self.pairs, &mut of(one).pairs);
-            return count;
+            return std::mem::swap(&mut self.pairs, &mut of(one).pairs);
         }
         ensure_scratch(&mut self.pairs, count, Pair::default());
         let pairs = SharedSlice::new(&mut self.pairs);
-        run_parts(workers, threads, |_, thread| {
+        run_parts(threads.len(), threads, |_, thread| {
             let Found { pairs: found, groups: next, .. } = of(thread);
             for pair in found.iter() {
                 let place = &mut next[(pair.a >> grouping.shift) as usize];
@@ -136,7 +135,6 @@ impl Groups {
                 *place += 1;
             }
         });
-        count
     }
 
     /// Forgets the pairs, and gives back memory if as many as `needed` are expected.
@@ -154,7 +152,7 @@ impl Groups {
     }
 
     /// Turns the counts of all lists into places.
-    fn place<T>(&mut self, (threads, of): (&mut [T], fn(&mut T) -> &mut Found)) -> usize {
+    fn place<T>(&mut self, threads: &mut [T], of: fn(&mut T) -> &mut Found) -> usize {
         self.starts.clear();
         let mut next = 0;
         for group in 0..self.grouping.count {

@@ -164,15 +164,10 @@ impl Kept {
         self.backward.get_or_init(|| self.reversed());
     }
 
-    /// Returns the partners of a box with lower ids, and those with larger ones, both sorted. After [`Kept::make_backward`].
+    /// Returns the partners of a box with lower ids, after [`Kept::make_backward`], and those with larger ones, both sorted.
     #[inline(always)]
     pub(crate) fn rows_of(&self, id: u32) -> (&[u32], &[u32]) {
         (self.backward.get().map_or(&[], |rows| rows.row(id)), self.forward.row(id))
-    }
-
-    /// Returns the partners of a box with larger ids, sorted.
-    pub(crate) fn later_partners(&self, id: u32) -> &[u32] {
-        self.forward.row(id)
     }
 
     pub(crate) fn degree(&self, id: u32) -> u32 {

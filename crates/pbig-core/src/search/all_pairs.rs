@@ -80,7 +80,7 @@ impl<'a> Request<'a> {
 /// The structures that hold the boxes of a search.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Store {
-    grid: Scratch<Grid>,
+    pub(crate) grid: Scratch<Grid>,
     two_grids: Scratch<TwoGrids>,
     pub(crate) tree: BoxIndex,
     /// The tree has the boxes of the last search.
@@ -88,20 +88,8 @@ pub(crate) struct Store {
     /// Both sets in one list, for a tree.
     both_sets: Scratch<Vec<Aabb>>,
     /// Grids, and trees, that took too much work.
-    grids: policy::GivenUp,
-    trees: policy::GivenUp,
-}
-
-impl Store {
-    #[cfg(test)]
-    pub(crate) fn note_given_up(&mut self) {
-        self.grids.note(true, 0);
-        self.trees.note(true, 0);
-    }
-
-    pub(crate) fn settle(&mut self) {
-        self.grid.settle();
-    }
+    pub(crate) grids: policy::GivenUp,
+    pub(crate) trees: policy::GivenUp,
 }
 
 /// The buffers of a search: what each thread has found.
@@ -302,9 +290,8 @@ impl AllPairs {
         true
     }
 
-    pub(crate) fn gather(&mut self, grouping: Grouping, groups: &mut Groups) -> usize {
-        let workers = self.hits.len();
-        groups.gather(grouping, (&mut self.hits, |hits| &mut hits.found), workers)
+    pub(crate) fn gather(&mut self, grouping: Grouping, groups: &mut Groups) {
+        groups.gather(grouping, &mut self.hits, |hits| &mut hits.found);
     }
 
     /// Forgets the pairs, and gives memory back if as many are expected.

@@ -1,6 +1,6 @@
 //! Brute force: every pair is tested.
 
-use super::hits::{BATCH, Hits, Rule};
+use super::hits::{Hits, Rule};
 use crate::parallel::run_with;
 use crate::simd::{BLOCK, EightBoxes, Simd, dispatch};
 use crate::{Aabb, Pair};
@@ -106,10 +106,7 @@ fn test_piece(
                 met &= met - 1;
             }
         }
-        if hits.found.pairs.len() - from >= BATCH {
-            hits.keep(from, rule);
-            from = hits.found.pairs.len();
-        }
+        from = hits.keep_many(from, rule);
         if hits.is_full {
             break;
         }

@@ -24,7 +24,7 @@ const SLACK: usize = 8;
 const AHEAD: usize = 24;
 
 /// Pairs that a thread gathers before it accounts for them, or hands them over.
-pub(super) const BATCH: usize = 4096;
+const BATCH: usize = 4096;
 
 /// Work, in tests of codes, that is charged before a piece of work is done.
 pub(super) const CHARGED_FROM: u64 = 1 << 16;
@@ -101,10 +101,10 @@ pub(crate) struct Rule<'a> {
 }
 
 impl<'a> Rule<'a> {
-    /// Makes a rule for a list of pairs, however many.
+    /// Makes a rule for a list of all pairs.
     #[cfg(test)]
-    pub(crate) fn listing(filters: Option<ById<'a, ProxyFilter>>, found: &'a AtomicU64) -> Self {
-        Self { filters, keys: None, receiver: None, max_pairs: u64::MAX, found, budget: None }
+    pub(crate) fn listing(found: &'a AtomicU64) -> Self {
+        Self { filters: None, keys: None, receiver: None, max_pairs: u64::MAX, found, budget: None }
     }
 }
 
@@ -230,22 +230,27 @@ impl Hits {
     #[inline(always)]
     fn test(&mut self, own: &[Record], records: &[Record], candidates: usize, rule: &Rule<'_>) {
         let from = self.found.pairs.len();
-        self.found.pairs.reserve(candidates + 1);
         let (queries, places) = (&self.queries[..candidates], &self.places[..candidates + AHEAD]);
-        let candidates = queries.iter().zip(places).zip(&places[AHEAD..]);
-        // SAFETY: the pairs have room for all candidates, and for one more that is overwritten.
-        unsafe {
-            let start = self.found.pairs.as_mut_ptr().add(from);
-            let mut next = start;
-            for ((&query, &place), &ahead) in candidates {
-                prefetch(records.as_ptr().wrapping_add(ahead as usize));
-                let (one, other) = (&own[query as usize], &records[place as usize]);
-                next.write(Pair::new(one.id, other.id));
-                next = next.add(usize::from(one.overlaps(other)));
-            }
-            self.found.pairs.set_len(from + next.offset_from(start) as usize);
+        let ahead = queries.iter().zip(places).zip(&places[AHEAD..]);
+        let pairs = ahead.map(
+            #[inline(always)]
+            |((query, place), ahead)| {
+                prefetch(records.as_ptr().wrapping_add(*ahead as usize));
+                (&own[*query as usize], &records[*place as usize])
+            },
+        );
+        push_overlapping(&mut self.found.pairs, pairs);
+        self.keep(from, rule);
+    }
+
+    /// Keeps the pairs from `from` on if they are many. Returns the first one that is not kept yet.
+    #[inline(always)]
+    pub(super) fn keep_many(&mut self, from: usize, rule: &Rule<'_>) -> usize {
+        if self.found.pairs.len() < from + BATCH {
+            return from;
         }
         self.keep(from, rule);
+        self.found.pairs.len()
     }
 
     /// Filters, counts and accounts for the pairs from `from` on.
@@ -296,29 +301,14 @@ impl Hits {
         for run in run.chunks(BATCH) {
             self.tests += run.len() as u64;
             self.extra += run.len() as u64 * (WORK_OF_EXACT_TEST - 1);
-            self.push_overlapping(one, run);
-            if self.found.pairs.len() - from >= BATCH {
-                self.keep(from, rule);
-                from = self.found.pairs.len();
-            }
+            let pairs = run.iter().map(
+                #[inline(always)]
+                |other| (one, other),
+            );
+            push_overlapping(&mut self.found.pairs, pairs);
+            from = self.keep_many(from, rule);
         }
         from
-    }
-
-    /// Appends the pairs of a box with those of a run that overlap it.
-    fn push_overlapping(&mut self, one: &Record, run: &[Record]) {
-        let from = self.found.pairs.len();
-        self.found.pairs.reserve(run.len() + 1);
-        // SAFETY: there is room for a pair of each, and one more to be overwritten.
-        unsafe {
-            let start = self.found.pairs.as_mut_ptr().add(from);
-            let mut next = start;
-            for other in run {
-                next.write(Pair::new(one.id, other.id));
-                next = next.add(usize::from(one.overlaps(other)));
-            }
-            self.found.pairs.set_len(from + next.offset_from(start) as usize);
-        }
     }
 
     /// Drops the pairs from `from` on whose filters, or keys, do not allow them.
@@ -336,5 +326,25 @@ impl Hits {
             kept += usize::from(allow(&first[pair.a as usize], &second[pair.b as usize - split]));
         }
         self.found.pairs.truncate(kept);
+    }
+}
+
+/// Appends those of some pairs of boxes that overlap. The pairs are those of slices, which have as many as they say.
+#[inline(always)]
+fn push_overlapping<'a>(
+    pairs: &mut Vec<Pair>,
+    candidates: impl ExactSizeIterator<Item = (&'a Record, &'a Record)>,
+) {
+    let from = pairs.len();
+    pairs.reserve(candidates.len() + 1);
+    // SAFETY: there is room for all pairs, and for one more that is overwritten.
+    unsafe {
+        let start = pairs.as_mut_ptr().add(from);
+        let mut next = start;
+        for (one, other) in candidates {
+            next.write(Pair::new(one.id, other.id));
+            next = next.add(usize::from(one.overlaps(other)));
+        }
+        pairs.set_len(from + next.offset_from(start) as usize);
     }
 }

@@ -14,9 +14,6 @@ use std::ops::Range;
 /// Number of leaves in a piece of work.
 const PIECE: usize = 64;
 
-/// Pairs of a leaf that are kept together.
-const BATCH: usize = 4096;
-
 /// Maximum number of boxes that are tested at once, without a look at the bounds of their leaf.
 const FEW_LANES: u32 = 3;
 
@@ -86,10 +83,7 @@ impl Join<'_, '_> {
             if index.is_leaf(at) {
                 self.test(simd, leaf, at, &bounds);
                 // Boxes as large as the world meet all others.
-                if self.hits.found.pairs.len() >= from + BATCH {
-                    self.hits.keep(from, self.rule);
-                    from = self.hits.found.pairs.len();
-                }
+                from = self.hits.keep_many(from, self.rule);
                 continue;
             }
             let node = &index.nodes[at as usize];

@@ -16,9 +16,6 @@ const FEW: usize = 16;
 /// Number of parts of many points that threads share. It does not follow the threads, because the work is counted.
 const PARTS: usize = 16;
 
-/// Number of pairs that are kept together.
-const BATCH: usize = 4096;
-
 /// A box with integers for corners, in the order of its coordinates.
 #[repr(align(32))]
 #[derive(Clone, Copy, Debug, Default)]
@@ -82,7 +79,7 @@ fn stream(intervals: &[Corners], points: &[Corners], rule: &Rule<'_>, hits: &mut
     run_parts_with(hits, points.chunks_mut(size), |hits, _, points| {
         let mut stream = Stream { rule, from: hits.found.pairs.len(), hits };
         stream.find(intervals, points, 2);
-        stream.keep();
+        stream.hits.keep(stream.from, rule);
     });
 }
 
@@ -146,15 +143,7 @@ impl Stream<'_, '_> {
 
     fn push(&mut self, one: &Corners, other: &Corners) {
         self.hits.found.pairs.push(Pair::new(one.id, other.id));
-        if self.hits.found.pairs.len() >= self.from + BATCH {
-            self.keep();
-        }
-    }
-
-    /// Filters and counts the pairs so far.
-    fn keep(&mut self) {
-        self.hits.keep(self.from, self.rule);
-        self.from = self.hits.found.pairs.len();
+        self.from = self.hits.keep_many(self.from, self.rule);
     }
 }
 
@@ -201,7 +190,7 @@ mod tests {
             for split in [None, Some(0), Some(boxes.len() / 3), Some(boxes.len())] {
                 let (found, mut hits) = (AtomicU64::new(0), [Hits::default(), Hits::default()]);
                 hits.iter_mut().for_each(|hits| hits.begin(None));
-                find_pairs(&boxes, split.map(|split| split as u32), &Rule::listing(None, &found), &mut hits);
+                find_pairs(&boxes, split.map(|split| split as u32), &Rule::listing(&found), &mut hits);
                 let mut found = [&hits[0].found.pairs[..], &hits[1].found.pairs].concat();
                 found.sort_unstable();
                 let is_across = |pair: &Pair| {
@@ -228,7 +217,7 @@ mod tests {
                     let by = stagger * ((i * 7919 % n) as f32 / n as f32 - 0.5);
                     (aabb.min[i % 3], aabb.max[i % 3]) = (aabb.min[i % 3] + by, aabb.max[i % 3] + by);
                 }
-                find_pairs(&boxes, None, &Rule::listing(None, &found), &mut hits);
+                find_pairs(&boxes, None, &Rule::listing(&found), &mut hits);
                 hits[0].work() as f64 / n as f64
             });
             println!("{stagger}: {work:?}");
