@@ -1,7 +1,7 @@
 //! Primitives of AVX2, which all x86-64 processors of the last ten years have.
 
 use super::codes::{MAX_STEP, MIN_STEP, Steps};
-use super::{BLOCK, Eight, Simd, lanewise};
+use super::{BLOCK, Eight, EightBoxes, Simd, lanewise};
 use crate::Aabb;
 use crate::aabb::sse::corners;
 use std::arch::x86_64::*;
@@ -204,13 +204,8 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn lowest(self, rows: [__m256i; 3]) -> [f32; 3] {
-        by!(folded(rows, _mm_min_ps))
-    }
-
-    #[inline(always)]
-    fn highest(self, rows: [__m256i; 3]) -> [f32; 3] {
-        by!(folded(rows, _mm_max_ps))
+    fn around(self, [x, y, z, max_x, max_y, max_z]: &EightBoxes) -> Aabb {
+        by!(Aabb::new(folded([x, y, z], _mm_min_ps), folded([max_x, max_y, max_z], _mm_max_ps)))
     }
 }
 
@@ -246,7 +241,7 @@ unsafe fn by_axis(a: __m256, b: __m256, c: __m256, d: __m256) -> [__m256i; 3] {
 /// # Safety
 /// The processor has AVX2.
 #[inline(always)]
-unsafe fn folded([a, b, c]: [__m256i; 3], of: unsafe fn(__m128, __m128) -> __m128) -> [f32; 3] {
+unsafe fn folded([a, b, c]: [&[f32; BLOCK]; 3], of: unsafe fn(__m128, __m128) -> __m128) -> [f32; 3] {
     // SAFETY: the caller's promise.
     unsafe {
         let (a, b, c) = (halves(a), halves(b), halves(c));
@@ -258,17 +253,11 @@ unsafe fn folded([a, b, c]: [__m256i; 3], of: unsafe fn(__m128, __m128) -> __m12
     }
 }
 
-/// Returns both halves of a row of floats.
-///
-/// # Safety
-/// The processor has AVX2.
+/// Returns both halves of a row.
 #[inline(always)]
-unsafe fn halves(row: __m256i) -> (__m128, __m128) {
-    // SAFETY: the caller's promise.
-    unsafe {
-        let row = _mm256_castsi256_ps(row);
-        (_mm256_castps256_ps128(row), _mm256_extractf128_ps::<1>(row))
-    }
+fn halves(row: &[f32; BLOCK]) -> (__m128, __m128) {
+    // SAFETY: SSE is part of the architecture; each load is of four numbers of eight.
+    unsafe { (_mm_loadu_ps(row.as_ptr()), _mm_loadu_ps(row[BLOCK / 2..].as_ptr())) }
 }
 
 /// Starts to bring the cache line at `address` into the cache.

@@ -66,11 +66,8 @@ pub(crate) trait Simd: Copy {
     /// Returns eight boxes axis by axis.
     fn transpose(self, boxes: [&Aabb; BLOCK]) -> [Self::Row; 6];
 
-    /// Returns the least float of each row. No float is a NaN.
-    fn lowest(self, rows: [Self::Row; 3]) -> [f32; 3];
-
-    /// Returns the greatest float of each row. No float is a NaN.
-    fn highest(self, rows: [Self::Row; 3]) -> [f32; 3];
+    /// Returns the box around eight boxes; an empty one around empty ones. No number is a NaN.
+    fn around(self, boxes: &EightBoxes) -> Aabb;
 
     /// Returns both corners of a box in steps: `scale` of them in a length unit, from `origin` on.
     #[inline(always)]
@@ -179,14 +176,6 @@ pub(crate) trait Simd: Copy {
             eight[k] = bytemuck::cast(self.store(self.select(valid, rows[k], empty[k / 3])));
         }
         eight
-    }
-
-    /// Returns the box around eight boxes; an empty one around empty ones.
-    #[inline(always)]
-    fn around(self, boxes: &EightBoxes) -> Aabb {
-        let low = [floats(self, &boxes[0]), floats(self, &boxes[1]), floats(self, &boxes[2])];
-        let high = [floats(self, &boxes[3]), floats(self, &boxes[4]), floats(self, &boxes[5])];
-        Aabb::new(self.lowest(low), self.highest(high))
     }
 
     /// Returns the lane of the least of those keys that are at most their limit. Keys are not negative. Of keys that differ in their last

@@ -1,6 +1,6 @@
 //! Primitives of NEON, which all 64-bit ARM processors have.
 
-use super::{BLOCK, Eight, Simd, lanewise};
+use super::{BLOCK, Eight, EightBoxes, Simd, lanewise};
 use crate::Aabb;
 use std::arch::aarch64::*;
 
@@ -126,13 +126,11 @@ impl Simd for Neon {
     }
 
     #[inline(always)]
-    fn lowest(self, rows: [Row; 3]) -> [f32; 3] {
-        rows.map(|[a, b]| by!(vminvq_f32(vminq_f32(vreinterpretq_f32_u32(a), vreinterpretq_f32_u32(b)))))
-    }
-
-    #[inline(always)]
-    fn highest(self, rows: [Row; 3]) -> [f32; 3] {
-        rows.map(|[a, b]| by!(vmaxvq_f32(vmaxq_f32(vreinterpretq_f32_u32(a), vreinterpretq_f32_u32(b)))))
+    fn around(self, boxes: &EightBoxes) -> Aabb {
+        let halves = |k: usize| by!([vld1q_f32(boxes[k].as_ptr()), vld1q_f32(boxes[k][4..].as_ptr())]);
+        let low = |k: usize| by!(vminvq_f32(vminq_f32(halves(k)[0], halves(k)[1])));
+        let high = |k: usize| by!(vmaxvq_f32(vmaxq_f32(halves(k)[0], halves(k)[1])));
+        Aabb::new([low(0), low(1), low(2)], [high(3), high(4), high(5)])
     }
 }
 

@@ -15,8 +15,8 @@ fn zip(a: Eight, b: Eight, of: impl Fn(u32, u32) -> u32) -> Eight {
 
 /// Folds eight floats in halves: one after the other takes twice as long.
 #[inline(always)]
-fn fold(row: Eight, of: impl Fn(f32, f32) -> f32) -> f32 {
-    let (row, mut four) = (row.map(f32::from_bits), [0.0; 4]);
+fn fold(row: &[f32; BLOCK], of: impl Fn(f32, f32) -> f32) -> f32 {
+    let mut four = [0.0; 4];
     (0..4).for_each(|i| four[i] = of(row[i], row[i + 4]));
     of(of(four[0], four[2]), of(four[1], four[3]))
 }
@@ -104,13 +104,10 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn lowest(self, rows: [Eight; 3]) -> [f32; 3] {
-        rows.map(|row| fold(row, |a, b| if a < b { a } else { b }))
-    }
-
-    #[inline(always)]
-    fn highest(self, rows: [Eight; 3]) -> [f32; 3] {
-        rows.map(|row| fold(row, |a, b| if a > b { a } else { b }))
+    fn around(self, boxes: &EightBoxes) -> Aabb {
+        let low = |k: usize| fold(&boxes[k], |a, b| if a < b { a } else { b });
+        let high = |k: usize| fold(&boxes[k], |a, b| if a > b { a } else { b });
+        Aabb::new([low(0), low(1), low(2)], [high(3), high(4), high(5)])
     }
 
     #[inline(always)]
