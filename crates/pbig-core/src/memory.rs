@@ -81,10 +81,6 @@ impl<T> ShrinkingVec<T> {
         self.list.clear();
         self.settle(needed);
     }
-
-    pub(crate) fn swap_list(&mut self, list: &mut Vec<T>) {
-        std::mem::swap(&mut self.list, list);
-    }
 }
 
 impl<T> Deref for ShrinkingVec<T> {

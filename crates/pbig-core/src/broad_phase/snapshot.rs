@@ -4,18 +4,12 @@
 //! in any format, even in one without NaN or infinity. All that is read is checked: no bytes make later calls panic.
 
 use super::BroadPhase;
-use crate::{Aabb, Backend, Config, Limits, Order, Pair, ProxyFilter};
+use crate::{Backend, Config, Limits, Order, Pair, ProxyFilter};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// The version of the format. A snapshot of another version is an error.
 const VERSION: u32 = 1;
-
-type Bits = [u32; 6];
-
-fn to_bits(aabb: &Aabb) -> Bits {
-    bytemuck::cast(*aabb)
-}
 
 /// Reads the version, before all other fields.
 fn version<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
@@ -36,7 +30,7 @@ struct Snapshot {
     backend: Backend,
     order: Order,
     limits: Limits,
-    boxes: Vec<Bits>,
+    boxes: Vec<[u32; 6]>,
     filters: Vec<ProxyFilter>,
     present: Vec<bool>,
     pairs: Vec<Pair>,
@@ -57,7 +51,7 @@ impl Serialize for BroadPhase {
             backend: self.config.backend,
             order: self.config.order,
             limits: self.config.limits,
-            boxes: world.boxes.iter().map(to_bits).collect(),
+            boxes: world.boxes.iter().map(|aabb| bytemuck::cast(*aabb)).collect(),
             filters: (0..ids).map(filter).collect(),
             present: (0..ids).map(|id| world.contains(id)).collect(),
             pairs: self.pairs().collect(),
@@ -117,6 +111,7 @@ impl Snapshot {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Aabb;
 
     #[test]
     fn broken_snapshots_are_errors() {

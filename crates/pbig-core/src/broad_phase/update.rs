@@ -29,8 +29,8 @@ impl BroadPhase {
     }
 
     fn swap_events(&mut self) {
-        self.comparison.added.swap_list(&mut self.events.added);
-        self.comparison.removed.swap_list(&mut self.events.removed);
+        std::mem::swap(&mut *self.comparison.added, &mut self.events.added);
+        std::mem::swap(&mut *self.comparison.removed, &mut self.events.removed);
     }
 
     /// Leaves the events, and forgets the changes.

@@ -79,7 +79,7 @@ impl Found {
 
     /// Takes pairs that were found elsewhere, and leaves other memory for them.
     pub(crate) fn take(&mut self, pairs: &mut Vec<Pair>) {
-        self.pairs.swap_list(pairs);
+        std::mem::swap(&mut *self.pairs, pairs);
         self.count(0);
     }
 

@@ -22,14 +22,10 @@ const OVERSIZE: u32 = u32::MAX;
 const INVALID: u32 = u32::MAX - 1;
 
 /// By bucket: boxes of one piece, then their place. The last two are oversize and invalid boxes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct BucketCounts([u32; MAX_BUCKETS + 3]);
+pub(super) type BucketCounts = [u32; MAX_BUCKETS + 3];
 
-impl BucketCounts {
-    const ZERO: Self = Self([0; MAX_BUCKETS + 3]);
-    const OVERSIZE: usize = MAX_BUCKETS + 1;
-    const INVALID: usize = MAX_BUCKETS + 2;
-}
+const OVERSIZE_BUCKET: usize = MAX_BUCKETS + 1;
+const INVALID_BUCKET: usize = MAX_BUCKETS + 2;
 
 /// Division of keys into buckets, and of boxes into pieces.
 #[derive(Clone, Copy)]
@@ -80,15 +76,15 @@ impl Grid {
     /// Computes keys, and counts boxes by bucket.
     fn count(&mut self, boxes: &[Aabb], split: Split, workers: usize) {
         let pieces = split.pieces.max(self.counts.len());
-        self.counts.resize(pieces, BucketCounts::ZERO);
+        self.counts.resize(pieces, [0; MAX_BUCKETS + 3]);
         // In the memory of the codes, which are computed when the keys are no longer needed.
         let keys: &mut [u32] = bytemuck::cast_slice_mut(&mut self.codes);
         let (keys, cells) = (&mut keys[..boxes.len()], self.cells);
         let parts = split_evenly(keys, split.pieces).zip(&mut self.counts[..]);
         run_parts(workers, parts, |piece, (keys, counts)| {
             let range = piece_range(boxes.len(), piece, split.pieces);
-            counts.0[..=split.buckets].fill(0);
-            (counts.0[BucketCounts::OVERSIZE], counts.0[BucketCounts::INVALID]) = (0, 0);
+            counts[..=split.buckets].fill(0);
+            (counts[OVERSIZE_BUCKET], counts[INVALID_BUCKET]) = (0, 0);
             dispatch!(count_keys, cells, &boxes[range.clone()], keys, counts, split.shift);
         });
     }
@@ -102,7 +98,7 @@ impl Grid {
         for bucket in 0..split.buckets {
             starts.push(next);
             for counts in counts.iter_mut() {
-                next += std::mem::replace(&mut counts.0[bucket], next);
+                next += std::mem::replace(&mut counts[bucket], next);
             }
         }
         starts.push(next);
@@ -111,7 +107,7 @@ impl Grid {
 
     fn list_oversize(&mut self, boxes: &[Aabb], first_id: u32, split: Split) {
         self.oversize.clear();
-        if self.counts[..split.pieces].iter().all(|counts| counts.0[BucketCounts::OVERSIZE] == 0) {
+        if self.counts[..split.pieces].iter().all(|counts| counts[OVERSIZE_BUCKET] == 0) {
             return;
         }
         let keys: &[u32] = bytemuck::cast_slice(&self.codes);
@@ -123,7 +119,7 @@ impl Grid {
     fn scatter(&mut self, (boxes, first_id): (&[Aabb], u32), split: Split, workers: usize) {
         let coarse = SharedSlice::new(&mut self.coarse);
         let keys: &[u32] = bytemuck::cast_slice(&self.codes);
-        run_parts(workers, &mut self.counts[..split.pieces], |piece, BucketCounts(next)| {
+        run_parts(workers, &mut self.counts[..split.pieces], |piece, next| {
             let range = piece_range(boxes.len(), piece, split.pieces);
             let first_id = first_id + range.start as u32;
             let (boxes, keys) = (&boxes[range.clone()], &keys[range]);
@@ -193,14 +189,11 @@ fn count_keys(
         if takes {
             bucket += (key >> shift) as usize;
         } else {
-            (key, bucket) = if aabb.is_valid() {
-                (OVERSIZE, BucketCounts::OVERSIZE)
-            } else {
-                (INVALID, BucketCounts::INVALID)
-            };
+            (key, bucket) =
+                if aabb.is_valid() { (OVERSIZE, OVERSIZE_BUCKET) } else { (INVALID, INVALID_BUCKET) };
         }
         *to = key;
-        counts.0[bucket] += 1;
+        counts[bucket] += 1;
     }
 }
 
