@@ -28,7 +28,7 @@ impl LookUp {
         let (world, mut clock) = (task.world, Clock::start());
         let (index, read) = {
             stage!("map");
-            task.tree.refresh_sorted(world)
+            task.tree.refresh_for_look_ups(world)
         };
         index.in_order(&world.changed, &mut self.order);
         task.kept.make_backward();

@@ -107,8 +107,8 @@ impl Tree {
         }
     }
 
-    /// Makes the tree fresh, with its boxes sorted, for look-ups of the changed ones. Returns it, and how many boxes were read.
-    pub(super) fn refresh_sorted(&mut self, world: &World) -> (&BoxIndex, usize) {
+    /// Makes the tree fresh, for look-ups of the changed boxes. Returns it, and how many boxes were read.
+    pub(super) fn refresh_for_look_ups(&mut self, world: &World) -> (&BoxIndex, usize) {
         self.make_stale();
         let (fresh, read) = self.stale_mut().refreshed(world, true);
         (&self.fresh.get_or_init(|| fresh).index, read)
@@ -137,17 +137,13 @@ impl Stale {
         std::mem::take(&mut self.index)
     }
 
-    /// Takes the tree, and brings it up to date, if need be with its boxes sorted. Returns how many boxes were read, too.
-    fn refreshed(&mut self, world: &World, is_sorted: bool) -> (Fresh, usize) {
+    /// Takes the tree, and brings it up to date. Returns how many boxes were read, too.
+    fn refreshed(&mut self, world: &World, is_for_look_ups: bool) -> (Fresh, usize) {
         let mut changed = std::mem::take(&mut self.changed);
         changed.extend_from_slice(&world.changed);
         let known = self.knows_changes.then_some(&changed[..]);
         let (mut index, present) = (self.take(), world.present.iter());
-        let read = if is_sorted {
-            index.refresh_sorted(&world.boxes, known, present)
-        } else {
-            index.refresh_present(&world.boxes, known, present)
-        };
+        let read = index.refresh_present(&world.boxes, known, present, is_for_look_ups);
         changed.clear();
         self.changed = changed;
         (Fresh { index, ..Fresh::default() }, read)

@@ -4,7 +4,7 @@
 //! boxes by id ─► sort (rarely) ─► nodes of eight boxes, eight nodes, ... ◄─ place (few changed), refit (many)
 //! ```
 //!
-//! Each node has eight children. A refit is one pass over the nodes, children first. Sorting is left until queries have looked at
+//! Each node has eight children. A refit is one pass over the nodes, children first. Boxes are sorted anew once queries have looked at
 //! enough nodes for a sort to pay.
 
 #![allow(clippy::needless_range_loop, reason = "a lane of several arrays")]
@@ -71,7 +71,6 @@ pub struct BoxIndex {
     listed: usize,
     /// Length of the list of boxes at the last refresh.
     known: usize,
-    is_sorted: bool,
     /// Boxes may have moved since the last sort.
     has_moved: bool,
     /// Nodes that queries have looked at since the last sort; not counted while no sort is wanted.

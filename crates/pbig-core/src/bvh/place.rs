@@ -16,7 +16,7 @@ impl BoxIndex {
         let place = |id: u32| self.places.get(id as usize).copied().unwrap_or(NONE);
         let aabb = |id: u32| boxes.get(id as usize).filter(|aabb| aabb.is_valid());
         let has_arrived = |id: &&u32| aabb(**id).is_some_and(|aabb| !self.is_near(place(**id), aabb));
-        if self.is_sorted { ids.iter().filter(has_arrived).count() } else { 0 }
+        if self.end > 0 { ids.iter().filter(has_arrived).count() } else { 0 }
     }
 
     /// Reads few boxes. Those that came, and those that have jumped, get places near others.

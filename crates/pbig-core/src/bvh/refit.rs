@@ -26,48 +26,33 @@ impl BoxIndex {
     pub fn refresh(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
         let gone = boxes.len() as u32..self.known as u32;
         if changed.is_none() || gone.is_empty() {
-            self.refresh_present(boxes, changed, 0..boxes.len() as u32);
+            self.refresh_present(boxes, changed, 0..boxes.len() as u32, false);
             return;
         }
         let changed: Vec<u32> = changed.unwrap_or_default().iter().copied().chain(gone).collect();
-        self.refresh_present(boxes, Some(&changed), 0..boxes.len() as u32);
+        self.refresh_present(boxes, Some(&changed), 0..boxes.len() as u32, false);
     }
 
-    /// As [`BoxIndex::refresh`]; no id but the `present` ones has a box. Returns the number of boxes that were read.
+    /// As [`BoxIndex::refresh`]; no id but the `present` ones has a box. Look-ups count their own nodes, and leave room for boxes that
+    /// come. Returns the number of boxes that were read.
     pub(crate) fn refresh_present(
         &mut self,
         boxes: &[Aabb],
         changed: Option<&[u32]>,
         present: impl Iterator<Item = u32> + Clone,
-    ) -> usize {
-        let read = self.update(boxes, changed, present.clone());
-        if !self.wants_sort() && !self.has_many_loose() {
-            return read;
-        }
-        // Queries may have looked at as many nodes as a sort costs.
-        let one = policy::nodes_for_sort(self.leaves, self.listed);
-        let is_sorted = self.is_sorted || self.looked_at.0.load(Ordering::Relaxed) >= one;
-        self.lay_out(boxes, present, is_sorted.then_some(Order::SORTED));
-        read + self.listed
-    }
-
-    /// As [`BoxIndex::refresh_present`], and leaves the boxes sorted.
-    pub(crate) fn refresh_sorted(
-        &mut self,
-        boxes: &[Aabb],
-        changed: Option<&[u32]>,
-        present: impl Iterator<Item = u32> + Clone,
+        is_for_look_ups: bool,
     ) -> usize {
         let mut read = 0;
-        if self.is_sorted {
+        if self.end > 0 {
             read = self.update(boxes, changed, present.clone());
+            let have_paid =
+                |nodes: u64| if is_for_look_ups { self.looked_up >= nodes } else { self.wants_sort() };
+            if !self.sort_after.is_some_and(have_paid) && !self.has_many_loose() {
+                return read;
+            }
         }
-        let is_bad = self.sort_after.is_some_and(|nodes| self.looked_up >= nodes);
-        if !self.is_sorted || is_bad || self.has_many_loose() {
-            self.lay_out(boxes, present, Some(Order::ROOMY));
-            read += self.listed;
-        }
-        read
+        self.lay_out(boxes, present, if is_for_look_ups { Order::ROOMY } else { Order::SORTED });
+        read + self.listed
     }
 
     /// Reads the changed boxes, if they are few, or all. Returns the number of boxes that were read.
@@ -165,7 +150,7 @@ impl BoxIndex {
     fn plan_sort(&mut self) {
         let has_many_loose = policy::FEW_LOOSE_SHARE * self.loose().len() > policy::loose_leaves(self.leaves);
         let has_grown = self.grown * policy::GROWN_SHARE > self.end as usize;
-        let is_bad = !self.is_sorted || has_many_loose || has_grown;
+        let is_bad = has_many_loose || has_grown;
         let one = policy::nodes_for_sort(self.leaves, self.listed);
         self.sort_after = match (is_bad, self.has_moved) {
             (true, _) => Some(one),
@@ -181,30 +166,27 @@ impl BoxIndex {
 
     /// As [`BoxIndex::sort`]; no id but the `present` ones has a box.
     pub(crate) fn sort_present(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>) {
-        self.lay_out(boxes, present, Some(Order::SORTED));
+        self.lay_out(boxes, present, Order::SORTED);
     }
 
     /// Sorts the boxes; of two sets, ids from `split` on are the second, and no leaf has boxes of both.
     pub(crate) fn sort_sets(&mut self, boxes: &[Aabb], split: Option<u32>) {
         let split = split.unwrap_or(u32::MAX);
-        self.lay_out(boxes, 0..boxes.len() as u32, Some(Order { split, ..Order::SORTED }));
+        self.lay_out(boxes, 0..boxes.len() as u32, Order { split, ..Order::SORTED });
     }
 
     fn refit(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32> + Clone) {
-        if self.end == 0 {
-            return self.lay_out(boxes, present, None);
-        }
         self.read_all(boxes);
         // After a peak, most leaves are empty.
         let full = self.bounds[..self.leaves as usize].iter().filter(|bounds| bounds.is_valid()).count();
         if policy::FULL_LEAVES_SHARE * full < self.leaves as usize {
-            return self.lay_out(boxes, present, self.is_sorted.then_some(Order::SORTED));
+            return self.lay_out(boxes, present, Order::SORTED);
         }
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         let has_come = |id: &u32| self.places[*id as usize] == NONE && boxes[*id as usize].is_valid();
         let came: Vec<u32> = present.clone().filter(has_come).collect();
         if came.len() > LANES * policy::loose_leaves(self.leaves) {
-            return self.lay_out(boxes, present, self.is_sorted.then_some(Order::SORTED));
+            return self.lay_out(boxes, present, Order::SORTED);
         }
         self.place(boxes, &came);
     }
@@ -232,8 +214,8 @@ impl BoxIndex {
         self.extents.push(f32::INFINITY);
     }
 
-    /// Makes all nodes anew: in the order of ids, or sorted.
-    fn lay_out(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>, order: Option<Order>) {
+    /// Makes all nodes anew.
+    fn lay_out(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>, order: Order) {
         let all = present.map(|id| (id, &boxes[id as usize])).filter(|(_, aabb)| aabb.is_valid());
         let mut entries: Vec<Entry> = all.map(|(id, aabb)| Entry::new(id, aabb)).collect();
         self.drop_peak(entries.len());
@@ -245,10 +227,8 @@ impl BoxIndex {
         self.extents.clear();
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         self.listed = entries.len();
-        let all = 0..entries.len();
-        let classes = order.map_or_else(|| Vec::from([all]), |order| sort(&mut entries, order));
-        let leaf = order.unwrap_or(Order::SORTED).leaf;
-        let classes = classes.into_iter().map(|class| self.push_leaves(&entries[class], leaf));
+        let classes = sort(&mut entries, order).into_iter();
+        let classes = classes.map(|class| self.push_leaves(&entries[class], order.leaf));
         let classes: Vec<_> = classes.collect();
         self.leaves = self.nodes.len() as u32;
         let mut roots: Vec<u32> =
@@ -259,12 +239,8 @@ impl BoxIndex {
         self.known = boxes.len();
         self.read_all(boxes);
         self.extents = self.bounds.iter().map(extent_sum).collect();
-        (self.grown, self.is_sorted) = (0, order.is_some());
-        if self.is_sorted {
-            *self.looked_at.0.get_mut() = 0;
-            self.looked_up = 0;
-            self.has_moved = false;
-        }
+        (self.grown, self.looked_up, self.has_moved) = (0, 0, false);
+        *self.looked_at.0.get_mut() = 0;
         self.plan_sort();
     }
 
