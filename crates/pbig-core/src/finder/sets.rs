@@ -121,13 +121,13 @@ impl Sets {
     /// Copies the valid boxes of each set that overlap the bounds of the other set. Drops more of them while more than a quarter of
     /// the boxes is dropped, because the bounds of the boxes that are left are smaller.
     fn copy_near(&mut self, a: &[Aabb], b: &[Aabb]) {
-        let mut first = Near::of(a, None, &bounds_of_valid(b));
-        let mut second = Near::of(b, None, &first.bounds);
+        let mut first = Chosen::of(a, None, &bounds_of_valid(b));
+        let mut second = Chosen::of(b, None, &first.bounds);
         let valid = first.valid + second.valid;
         let (mut before, mut left) = (a.len() + b.len(), first.ids.len() + second.ids.len());
         while 4 * left < 3 * before {
-            first = Near::of(a, Some(&first.ids), &second.bounds);
-            second = Near::of(b, Some(&second.ids), &first.bounds);
+            first = Chosen::of(a, Some(&first.ids), &second.bounds);
+            second = Chosen::of(b, Some(&second.ids), &first.bounds);
             (before, left) = (left, first.ids.len() + second.ids.len());
         }
         if first.ids.is_empty() || second.ids.is_empty() {
@@ -159,14 +159,14 @@ fn seem_near(set: &[Aabb], near: &Aabb) -> bool {
 }
 
 /// The valid boxes of a set that overlap a box.
-struct Near {
+struct Chosen {
     ids: Vec<u32>,
     bounds: Aabb,
     /// The number of boxes that are valid, near or not.
     valid: u64,
 }
 
-impl Near {
+impl Chosen {
     /// Finds those of all boxes of a set, or of the named ones, that overlap a box.
     fn of(set: &[Aabb], named: Option<&[u32]>, near: &Aabb) -> Self {
         let len = named.map_or(set.len(), <[u32]>::len);
