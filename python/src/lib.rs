@@ -23,7 +23,11 @@ fn pairs<'py>(py: Python<'py>, boxes: BoxArray<'py>) -> PyResult<Table<'py>> {
 #[pyfunction]
 fn pairs_between<'py>(py: Python<'py>, a: BoxArray<'py>, b: BoxArray<'py>) -> PyResult<Table<'py>> {
     let (a, b) = (a.numbers()?, b.numbers()?);
-    let find = || Finder::default().find_between(&a.boxes(), &b.boxes()).map(<[_]>::to_vec);
+    let find = || {
+        let mut finder = Finder::default();
+        finder.find_between(&a.boxes(), &b.boxes())?;
+        Ok(finder.into_pairs_between())
+    };
     Ok(table(py, search(py, find)?))
 }
 
@@ -46,7 +50,7 @@ fn mesh_pairs<'py>(
 #[pyfunction]
 fn edges<'py>(py: Python<'py>, faces: PyReadonlyArray2<'py, u32>) -> PyResult<Table<'py>> {
     let faces = bytemuck::cast_slice(faces.as_slice()?);
-    Ok(table(py, py.detach(|| mesh::edges(faces))))
+    Ok(table(py, search(py, || Ok(mesh::edges(faces)))?))
 }
 
 #[pymodule]

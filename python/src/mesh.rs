@@ -1,6 +1,7 @@
 //! The vertices, edges and faces of a mesh, their boxes, and pairs of these that share no vertex.
 
 use pbig_core::{Aabb, Boxes, Error, Finder, Keys, NO_KEY};
+use rayon::prelude::*;
 
 /// Two kinds of elements: `v` for vertices, `e` for edges or `f` for faces.
 pub(crate) type KindPair = [char; 2];
@@ -10,15 +11,34 @@ type Pairs = Vec<[u32; 2]>;
 
 /// Returns the edges of faces, each once: larger and then smaller vertex, sorted. The program `pbig` has the same rule.
 pub(crate) fn edges(faces: &[Keys]) -> Pairs {
+    let vertices = sides(faces).map(|[larger, _]| larger as usize + 1).max().unwrap_or(0);
+    // By larger vertex: where its smaller ones begin; once they are written, where they end.
+    let mut next = vec![0; vertices + 1];
+    sides(faces).for_each(|[larger, _]| next[larger as usize + 1] += 1);
+    (0..vertices).for_each(|vertex| next[vertex + 1] += next[vertex]);
+    let mut smaller = vec![0; next[vertices]];
+    for [v, w] in sides(faces) {
+        smaller[next[v as usize]] = w;
+        next[v as usize] += 1;
+    }
+    let mut start = 0;
+    let mut edges = Pairs::with_capacity(smaller.len());
+    for (larger, end) in (0..).zip(&next[..vertices]) {
+        let row = &mut smaller[start..*end];
+        row.sort_unstable();
+        edges.extend(row.chunk_by(|v, w| v == w).map(|equal| [larger, equal[0]]));
+        start = *end;
+    }
+    edges
+}
+
+/// Yields the sides of faces, larger vertex first. None is from a vertex to itself.
+fn sides(faces: &[Keys]) -> impl Iterator<Item = [u32; 2]> {
     let sides = faces.iter().flat_map(|face| {
-        let corners = face.iter().filter(|vertex| **vertex != NO_KEY).count();
+        let corners = if face[3] == NO_KEY { 3 } else { 4 };
         (0..corners).map(move |k| [face[k], face[(k + 1) % corners]])
     });
-    let ordered = sides.map(|[v, w]| [v.max(w), v.min(w)]);
-    let mut edges: Pairs = ordered.filter(|[v, w]| v != w).collect();
-    edges.sort_unstable();
-    edges.dedup();
-    edges
+    sides.map(|[v, w]| [v.max(w), v.min(w)]).filter(|[v, w]| v != w)
 }
 
 /// The boxes of the vertices, and the faces: three vertices and `NO_KEY`, or four vertices.
@@ -29,7 +49,7 @@ pub(crate) struct Mesh<'a> {
 
 impl<'a> Mesh<'a> {
     pub(crate) fn new([from, to]: [&[[f64; 3]]; 2], faces: &'a [Keys], margin: f64) -> Self {
-        let vertices = from.iter().zip(to).map(|(from, to)| swept(from, to, margin)).collect();
+        let vertices = from.par_iter().zip(to).map(|(from, to)| swept(from, to, margin)).collect();
         Self { vertices, faces }
     }
 
@@ -52,7 +72,7 @@ impl<'a> Mesh<'a> {
             'e' => edges(self.faces).into_iter().map(|[v, w]| [v, w, NO_KEY, NO_KEY]).collect(),
             _ => self.faces.to_vec(),
         };
-        Elements { boxes: keys.iter().map(|keys| self.around(keys)).collect(), keys }
+        Elements { boxes: keys.par_iter().map(|keys| self.around(keys)).collect(), keys }
     }
 
     /// Returns the box around some vertices; invalid if one of theirs is.
@@ -96,11 +116,13 @@ impl Elements {
 
     fn pairs(&self) -> Result<Pairs, Error> {
         let mut finder = Finder::default();
-        Ok(bytemuck::cast_slice(finder.find_without_shared(&self.boxes, &self.keys)?).to_vec())
+        finder.find_without_shared(&self.boxes, &self.keys)?;
+        Ok(bytemuck::cast_vec(finder.into_pairs()))
     }
 
     fn pairs_with(&self, other: &Self) -> Result<Pairs, Error> {
         let mut finder = Finder::default();
-        Ok(bytemuck::cast_slice(finder.find_between(self.apart(), other.apart())?).to_vec())
+        finder.find_between(self.apart(), other.apart())?;
+        Ok(bytemuck::cast_vec(finder.into_pairs_between()))
     }
 }

@@ -28,7 +28,7 @@ use sets::Sets;
 pub fn find_pairs(boxes: &[Aabb]) -> Result<Vec<Pair>, Error> {
     let mut finder = Finder::default();
     finder.find(boxes)?;
-    Ok(finder.pairs)
+    Ok(finder.into_pairs())
 }
 
 /// Finds all pairs of lists of boxes, and keeps its buffers between calls.
@@ -225,6 +225,7 @@ impl Finder {
         stage!("emit");
         let mut clock = Clock::start();
         if let Some(grouping) = grouping {
+            self.groups.take_memory(&mut self.pairs);
             self.all_pairs.gather(grouping, &mut self.groups);
             self.groups.list(&mut self.pairs, self.all_pairs.hits.len());
         } else {
@@ -236,6 +237,11 @@ impl Finder {
     /// Returns the pairs of the last call that lists pairs of one set; none if it failed.
     pub fn pairs(&self) -> &[Pair] {
         &self.pairs
+    }
+
+    /// Returns the list of the last call that lists pairs of one set, without a copy.
+    pub fn into_pairs(self) -> Vec<Pair> {
+        self.pairs
     }
 
     /// Gives back all memory but the lists of the last call. A device keeps its own.

@@ -13,6 +13,9 @@ const CLASS_BITS: u32 = 2;
 /// Maximum number of sampled boxes of a class, and of all other classes that a class is sorted beside.
 const MAX_SAMPLED: usize = 64;
 
+/// Approximate maximum number of sampled boxes of all classes: each class looks at all of them, and there may be hundreds of classes.
+const MAX_SAMPLED_IN_ALL: usize = 2048;
+
 /// Minimum number of sampled boxes around a part that tell which are around its halves.
 const MIN_SAMPLED: usize = 16;
 
@@ -83,12 +86,12 @@ pub(super) fn sort(entries: &mut [Entry], Order { split, leaf }: Order) -> Vec<R
     if !entries.windows(2).all(|two| are_alike(&two[0], &two[1])) {
         entries.sort_unstable_by_key(|entry| entry.class(split));
     }
-    let (mut classes, mut samples, mut first) = (Vec::new(), Vec::new(), 0);
+    let (mut classes, mut first) = (Vec::new(), 0);
     for class in entries.chunk_by(are_alike) {
         classes.push(first..first + class.len());
-        samples.extend(Sampled::of(class));
         first += class.len();
     }
+    let samples = sampled(entries, &classes);
     let workers = if entries.len() < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
     run_parts(workers, split_into(entries, classes.iter().map(Range::len)), |_, class| {
         let may_meet = |sample: &Sampled| sample.entry.may_meet(&class[0], split);
@@ -96,6 +99,12 @@ pub(super) fn sort(entries: &mut [Entry], Order { split, leaf }: Order) -> Vec<R
         sort_by_place(class, leaf, &Others { samples, is_few: false });
     });
     classes
+}
+
+/// Returns boxes that stand for those of each class: the fewer of one, the more classes there are.
+fn sampled(entries: &[Entry], classes: &[Range<usize>]) -> Vec<Sampled> {
+    let most = (MAX_SAMPLED_IN_ALL / classes.len().max(1)).clamp(1, MAX_SAMPLED);
+    classes.iter().flat_map(|class| Sampled::of(&entries[class.clone()], most)).collect()
 }
 
 /// Halves a list again and again at the median of its best axis. Medians are ranks, so that a box far away costs the others
@@ -166,8 +175,9 @@ struct Sampled {
 }
 
 impl Sampled {
-    fn of(class: &[Entry]) -> impl Iterator<Item = Self> {
-        let step = class.len().div_ceil(MAX_SAMPLED);
+    /// Yields some boxes of a class, about `most`.
+    fn of(class: &[Entry], most: usize) -> impl Iterator<Item = Self> {
+        let step = class.len().div_ceil(most);
         let boxes = class.len() as f64 / class.len().div_ceil(step) as f64;
         scattered(class.len(), step).map(move |i| Self { entry: class[i], boxes })
     }
@@ -266,5 +276,23 @@ impl Measure {
             boxes += other.boxes;
         }
         sum / boxes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each class looks at the samples of all.
+    #[test]
+    fn many_classes_have_few_samples_each() {
+        let entries: Vec<Entry> =
+            (0..30_000).map(|id| Entry::new(id, &Aabb::new([0.0; 3], [1.0; 3]))).collect();
+        for (classes, most) in [(1, 64), (32, 2048), (33, 2046), (500, 2000), (3000, 3000)] {
+            let len = entries.len() / classes;
+            let ranges: Vec<_> = (0..classes).map(|class| class * len..(class + 1) * len).collect();
+            let samples = sampled(&entries, &ranges);
+            assert!((most / 2..=most).contains(&samples.len()), "{classes}: {}", samples.len());
+        }
     }
 }

@@ -45,6 +45,11 @@ impl Finder {
         bytemuck::cast_slice(&self.pairs_between)
     }
 
+    /// Returns the list of the last call of [`Finder::find_between`], without a copy.
+    pub fn into_pairs_between(self) -> Vec<CrossPair> {
+        bytemuck::cast_vec(self.pairs_between)
+    }
+
     /// Calls `visit` once for every pair of a box of `a` with a box of `b` that overlap, as [`Finder::for_each_pair`] does for one
     /// set. See [`Finder::find_between`] for the sets. Returns the number of pairs.
     ///

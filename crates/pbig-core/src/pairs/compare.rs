@@ -51,7 +51,7 @@ impl Comparison {
                 (grouping.ids_of(group).start as u32, pairs.range(group).start as u32);
             part.added.clear();
             part.removed.clear();
-            pairs.sort::<false>(group, sorter, spans, pool, first_place);
+            pairs.sort(group, sorter, spans, pool, first_place);
             if pairs.may_repeat {
                 groups::drop_repeated(spans, pool, first_place);
             }

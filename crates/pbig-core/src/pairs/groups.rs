@@ -4,8 +4,9 @@ use super::row::{self, SHORT};
 use crate::Pair;
 use crate::id_set::IdSet;
 use crate::memory::ShrinkingVec;
-use crate::parallel::{SharedSlice, ensure_scratch, run_parts, run_parts_with, split_into};
+use crate::parallel::{SharedSlice, empty_room, ensure_scratch, run_parts, run_parts_with, split_into};
 use crate::simd::{Simd, dispatch};
+use std::mem::MaybeUninit;
 use std::ops::{Range, RangeInclusive};
 
 /// log2 of the ids in a group: in larger groups the rows do not fit the cache.
@@ -52,8 +53,9 @@ impl Span {
 pub(crate) struct Found {
     /// In no particular order.
     pub(crate) pairs: ShrinkingVec<Pair>,
-    /// By group of `a`: pairs found. Empty if pairs are not counted by group.
-    groups: Vec<u32>,
+    /// By group of `a`: pairs found, in four counts, because one after the other in the same count would wait for it. Empty if pairs
+    /// are not counted by group.
+    groups: Vec<[u32; 4]>,
     shift: u32,
 }
 
@@ -63,7 +65,7 @@ impl Found {
         let Grouping { count, shift, .. } = grouping.unwrap_or_default();
         self.pairs.clear();
         self.groups.clear();
-        self.groups.resize(count, 0);
+        self.groups.resize(count, [0; 4]);
         self.shift = shift;
     }
 
@@ -71,8 +73,8 @@ impl Found {
     #[inline(always)]
     pub(crate) fn count(&mut self, from: usize) {
         if !self.groups.is_empty() {
-            for pair in &self.pairs[from..] {
-                self.groups[(pair.a >> self.shift) as usize] += 1;
+            for (i, pair) in self.pairs[from..].iter().enumerate() {
+                self.groups[(pair.a >> self.shift) as usize][i % 4] += 1;
             }
         }
     }
@@ -124,17 +126,18 @@ impl Groups {
         if let ([one], 1) = (&mut *threads, grouping.count) {
             return std::mem::swap(&mut self.pairs, &mut of(one).pairs);
         }
-        ensure_scratch(&mut self.pairs, count, Pair::default());
-        let pairs = SharedSlice::new(&mut self.pairs);
+        let pairs = SharedSlice::new(empty_room(&mut self.pairs, count));
         run_parts(threads.len(), threads, |_, thread| {
             let Found { pairs: found, groups: next, .. } = of(thread);
             for pair in found.iter() {
-                let place = &mut next[(pair.a >> grouping.shift) as usize];
+                let place = &mut next[(pair.a >> grouping.shift) as usize][0];
                 // SAFETY: every pair of every list has its own place.
-                unsafe { pairs.write(*place as usize, *pair) };
+                unsafe { pairs.write(*place as usize, MaybeUninit::new(*pair)) };
                 *place += 1;
             }
         });
+        // SAFETY: every place has a pair.
+        unsafe { self.pairs.set_len(count) };
     }
 
     /// Forgets the pairs, and gives back memory if as many as `needed` are expected.
@@ -158,7 +161,8 @@ impl Groups {
         for group in 0..self.grouping.count {
             self.starts.push(next);
             for thread in threads.iter_mut() {
-                next += std::mem::replace(&mut of(thread).groups[group], next);
+                let places = [next, 0, 0, 0];
+                next += std::mem::replace(&mut of(thread).groups[group], places).iter().sum::<u32>();
             }
         }
         self.starts.push(next);
@@ -174,27 +178,20 @@ impl Groups {
         self.starts[group] as usize..self.starts[group + 1] as usize
     }
 
-    /// Replaces `list` by all pairs in order.
+    /// Takes the memory of a list for the next pairs.
+    pub(crate) fn take_memory(&mut self, list: &mut Vec<Pair>) {
+        std::mem::swap(&mut *self.pairs, list);
+    }
+
+    /// Swaps `list` with all pairs in order.
     pub(crate) fn list(&mut self, list: &mut Vec<Pair>, workers: usize) {
-        list.clear();
-        list.reserve(self.len());
+        std::mem::swap(&mut *self.pairs, list);
         let mut sorters = self.take_sorters(workers);
-        let lens = (0..self.grouping.count).map(|group| self.range(group).len());
-        let parts = split_into(list.spare_capacity_mut(), lens);
-        run_parts_with(&mut sorters[..workers], parts, |sorter, group, pairs| {
-            let spans = &mut std::mem::take(&mut sorter.spans);
-            let others = &mut std::mem::take(&mut sorter.others);
-            spans.resize(self.grouping.ids_of(group).len(), Span::default());
-            ensure_scratch(others, pairs.len(), 0);
-            self.sort::<true>(group, sorter, spans, &mut others[..pairs.len()], 0);
-            for ((to, &a), &b) in pairs.iter_mut().zip(&*sorter.firsts).zip(&**others) {
-                to.write(Pair { a, b });
-            }
-            (sorter.spans, sorter.others) = (std::mem::take(spans), std::mem::take(others));
+        let groups = split_into(list, (0..self.grouping.count).map(|group| self.range(group).len()));
+        run_parts_with(&mut sorters[..workers], groups, |sorter, group, pairs| {
+            sorter.sort_in_place(self.grouping.ids_of(group), pairs);
         });
         self.sorters = sorters;
-        // SAFETY: all groups have written their pairs.
-        unsafe { list.set_len(self.len()) };
     }
 
     /// Takes the buffers of the threads that sort groups, to be put back.
@@ -204,9 +201,8 @@ impl Groups {
         sorters
     }
 
-    /// Sorts a group: the `b` of each pair into `others`, row by row, and where each row lies, counted from `base`; with
-    /// `LIST`, the `a` of each pair into the sorter's `firsts`.
-    pub(super) fn sort<const LIST: bool>(
+    /// Sorts a group: the `b` of each pair into `others`, row by row, and where each row lies, counted from `base`.
+    pub(super) fn sort(
         &self,
         group: usize,
         sorter: &mut Sorter,
@@ -215,13 +211,8 @@ impl Groups {
         base: u32,
     ) {
         let first_id = self.grouping.ids_of(group).start as u32;
-        let pairs = &self.pairs[self.range(group)];
-        if LIST {
-            ensure_scratch(&mut sorter.firsts, pairs.len(), 0);
-        }
-        ensure_scratch(&mut sorter.unsorted, pairs.len() + SHORT, 0);
-        sorter.largest = sorter.largest.max(pairs.len());
-        dispatch!(sort_rows::<LIST>, pairs, (first_id, base), spans, others, sorter);
+        sorter.sort(&self.pairs[self.range(group)], first_id, spans, others);
+        spans.iter_mut().for_each(|span| span.start += base);
     }
 }
 
@@ -229,9 +220,8 @@ impl Groups {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sorter {
     spans: Vec<Span>,
+    /// The `b` of each pair, in order.
     others: ShrinkingVec<u32>,
-    /// The `a` of each pair, in order.
-    firsts: ShrinkingVec<u32>,
     /// The `b` of each pair, by row, in no order within it.
     unsorted: ShrinkingVec<u32>,
     /// Empty: for rows that are long.
@@ -241,11 +231,29 @@ pub(super) struct Sorter {
 }
 
 impl Sorter {
+    /// Sorts pairs whose `a` are among some ids.
+    fn sort_in_place(&mut self, ids: Range<usize>, pairs: &mut [Pair]) {
+        let (mut spans, mut others) = (std::mem::take(&mut self.spans), std::mem::take(&mut self.others));
+        let (first_id, len) = (ids.start as u32, pairs.len() + SHORT);
+        spans.resize(ids.len(), Span::default());
+        ensure_scratch(&mut others, len, 0);
+        self.sort(pairs, first_id, &mut spans, &mut others[..len]);
+        for (a, span) in (first_id..).zip(&spans) {
+            write_row(a, span.range(), &others[..len], pairs);
+        }
+        (self.spans, self.others) = (spans, others);
+    }
+
+    /// Sorts the `b` of pairs into rows. The `a` of the first row is `first_id`.
+    fn sort(&mut self, pairs: &[Pair], first_id: u32, spans: &mut [Span], others: &mut [u32]) {
+        ensure_scratch(&mut self.unsorted, pairs.len() + SHORT, 0);
+        self.largest = self.largest.max(pairs.len());
+        dispatch!(sort_rows, pairs, first_id, spans, others, self);
+    }
+
     fn settle(&mut self) {
         let needed = std::mem::take(&mut self.largest) + SHORT;
-        [&mut self.others, &mut self.firsts, &mut self.unsorted]
-            .into_iter()
-            .for_each(|list| list.settle(needed));
+        [&mut self.others, &mut self.unsorted].into_iter().for_each(|list| list.settle(needed));
     }
 }
 
@@ -274,17 +282,40 @@ fn dedup(row: &mut [u32]) -> usize {
     len
 }
 
+/// Writes the pairs of a row, eight at a time. What comes behind a row is written later.
+#[inline(always)]
+fn write_row(a: u32, row: Range<usize>, others: &[u32], pairs: &mut [Pair]) {
+    let mut start = row.start;
+    loop {
+        match (others[start..].first_chunk::<SHORT>(), pairs[start..].first_chunk_mut::<SHORT>()) {
+            (Some(others), Some(eight)) => fill(a, others, eight),
+            _ => fill(a, &others[start..row.end], &mut pairs[start..row.end]),
+        }
+        start += SHORT;
+        if start >= row.end {
+            return;
+        }
+    }
+}
+
+#[inline(always)]
+fn fill(a: u32, others: &[u32], pairs: &mut [Pair]) {
+    for (pair, &b) in pairs.iter_mut().zip(others) {
+        *pair = Pair { a, b };
+    }
+}
+
 /// Scatters the `b` of pairs into rows, and sorts the rows.
 #[inline(always)]
-fn sort_rows<const LIST: bool>(
+fn sort_rows(
     simd: impl Simd,
     pairs: &[Pair],
-    (first_id, base): (u32, u32),
+    first_id: u32,
     spans: &mut [Span],
     others: &mut [u32],
     sorter: &mut Sorter,
 ) {
-    let Sorter { firsts, unsorted, long, .. } = sorter;
+    let Sorter { unsorted, long, .. } = sorter;
     spans.fill(Span::default());
     for pair in pairs {
         spans[(pair.a - first_id) as usize].len += 1;
@@ -296,17 +327,11 @@ fn sort_rows<const LIST: bool>(
     }
     for pair in pairs {
         let span = &mut spans[(pair.a - first_id) as usize];
-        let place = (span.start + span.len) as usize;
-        unsorted[place] = pair.b;
-        if LIST {
-            firsts[place] = pair.a;
-        }
+        unsorted[(span.start + span.len) as usize] = pair.b;
         span.len += 1;
     }
     for span in spans {
-        let range = span.range();
-        row::sort_into(simd, unsorted, range, others, long);
-        span.start += base;
+        row::sort_into(simd, unsorted, span.range(), others, long);
     }
 }
 

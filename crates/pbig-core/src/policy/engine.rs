@@ -16,8 +16,9 @@ const LOOK_UP_TO_NODES_PER_BOX: u64 = 6;
 /// long as reading an id without one.
 const LIST_UP_TO_ONE_IN: usize = 2;
 
-/// Maximum number of searches in a row after look-ups that were given up.
-const MAX_SEARCHES: u32 = 64;
+/// Maximum number of calls in a row without a way that was given up. If the world has become easy, the next ones may take tens of times
+/// as long as they need to.
+const MAX_WITHOUT: u32 = 16;
 
 /// Maximum share of boxes that came or have jumped, as one in this number: a place takes as long as two look-ups.
 const PLACE_ONE_IN: usize = 32;
@@ -65,7 +66,7 @@ impl GivenUp {
 
     pub(crate) fn note(&mut self, is_given_up: bool, changed: usize) {
         if is_given_up {
-            let searches = (2 * self.searches).clamp(1, MAX_SEARCHES);
+            let searches = (2 * self.searches).clamp(1, MAX_WITHOUT);
             *self = Self { changed, searches, left: searches };
         } else {
             self.searches /= 2;
@@ -95,8 +96,8 @@ mod tests {
             assert!(!given_up.forbids(99));
             (0..).find(|_| !given_up.forbids(100))
         };
-        assert_eq!([(); 8].map(|()| searches()), [1, 2, 4, 8, 16, 32, 64, 64].map(Some));
-        (0..7).for_each(|_| given_up.note(false, 100));
+        assert_eq!([(); 8].map(|()| searches()), [1, 2, 4, 8, 16, 16, 16, 16].map(Some));
+        (0..5).for_each(|_| given_up.note(false, 100));
         given_up.note(true, 100);
         assert!(given_up.forbids(100) && !given_up.forbids(100));
     }

@@ -168,18 +168,18 @@ impl AllPairs {
 
     fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, report: &mut Report) {
         let is_forced = request.config.engine == Some(Engine::Tree);
-        let is_hard = request.is_repeated && store.grids.forbids(request.count());
+        let is_hard = request.is_repeated && store.grids.forbids(0);
         if !is_forced && !is_hard {
             let is_done = self.search_grid(request, store, rule, report);
-            store.grids.note(!is_done, request.count());
+            store.grids.note(!is_done, 0);
             if is_done {
                 return;
             }
         }
-        let is_hard = request.is_repeated && store.trees.forbids(request.count());
+        let is_hard = request.is_repeated && store.trees.forbids(0);
         if is_forced || !is_hard {
             let is_done = self.search_tree(request, store, rule, report);
-            store.trees.note(!is_done, request.count());
+            store.trees.note(!is_done, 0);
             if is_done {
                 return;
             }
