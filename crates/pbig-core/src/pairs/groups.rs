@@ -211,7 +211,9 @@ impl Groups {
         base: u32,
     ) {
         let first_id = self.grouping.ids_of(group).start as u32;
-        sorter.sort(&self.pairs[self.range(group)], first_id, spans, others);
+        let pairs = &self.pairs[self.range(group)];
+        sorter.make_room(pairs.len());
+        dispatch!(sort_rows, pairs, first_id, spans, others, sorter);
         spans.iter_mut().for_each(|span| span.start += base);
     }
 }
@@ -220,7 +222,7 @@ impl Groups {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sorter {
     spans: Vec<Span>,
-    /// The `b` of each pair, in order.
+    /// The `b` of a long row, in order.
     others: ShrinkingVec<u32>,
     /// The `b` of each pair, by row, in no order within it.
     unsorted: ShrinkingVec<u32>,
@@ -233,22 +235,17 @@ pub(super) struct Sorter {
 impl Sorter {
     /// Sorts pairs whose `a` are among some ids.
     fn sort_in_place(&mut self, ids: Range<usize>, pairs: &mut [Pair]) {
-        let (mut spans, mut others) = (std::mem::take(&mut self.spans), std::mem::take(&mut self.others));
-        let (first_id, len) = (ids.start as u32, pairs.len() + SHORT);
+        let mut spans = std::mem::take(&mut self.spans);
         spans.resize(ids.len(), Span::default());
-        ensure_scratch(&mut others, len, 0);
-        self.sort(pairs, first_id, &mut spans, &mut others[..len]);
-        for (a, span) in (first_id..).zip(&spans) {
-            write_row(a, span.range(), &others[..len], pairs);
-        }
-        (self.spans, self.others) = (spans, others);
+        self.make_room(pairs.len());
+        ensure_scratch(&mut self.others, pairs.len() + SHORT, 0);
+        dispatch!(sort_pairs, pairs, ids.start as u32, &mut spans, self);
+        self.spans = spans;
     }
 
-    /// Sorts the `b` of pairs into rows. The `a` of the first row is `first_id`.
-    fn sort(&mut self, pairs: &[Pair], first_id: u32, spans: &mut [Span], others: &mut [u32]) {
-        ensure_scratch(&mut self.unsorted, pairs.len() + SHORT, 0);
-        self.largest = self.largest.max(pairs.len());
-        dispatch!(sort_rows, pairs, first_id, spans, others, self);
+    fn make_room(&mut self, pairs: usize) {
+        ensure_scratch(&mut self.unsorted, pairs + SHORT, 0);
+        self.largest = self.largest.max(pairs);
     }
 
     fn settle(&mut self) {
@@ -282,40 +279,9 @@ fn dedup(row: &mut [u32]) -> usize {
     len
 }
 
-/// Writes the pairs of a row, eight at a time. What comes behind a row is written later.
+/// Scatters the `b` of pairs into rows: into `unsorted`, in no order within a row.
 #[inline(always)]
-fn write_row(a: u32, row: Range<usize>, others: &[u32], pairs: &mut [Pair]) {
-    let mut start = row.start;
-    loop {
-        match (others[start..].first_chunk::<SHORT>(), pairs[start..].first_chunk_mut::<SHORT>()) {
-            (Some(others), Some(eight)) => fill(a, others, eight),
-            _ => fill(a, &others[start..row.end], &mut pairs[start..row.end]),
-        }
-        start += SHORT;
-        if start >= row.end {
-            return;
-        }
-    }
-}
-
-#[inline(always)]
-fn fill(a: u32, others: &[u32], pairs: &mut [Pair]) {
-    for (pair, &b) in pairs.iter_mut().zip(others) {
-        *pair = Pair { a, b };
-    }
-}
-
-/// Scatters the `b` of pairs into rows, and sorts the rows.
-#[inline(always)]
-fn sort_rows(
-    simd: impl Simd,
-    pairs: &[Pair],
-    first_id: u32,
-    spans: &mut [Span],
-    others: &mut [u32],
-    sorter: &mut Sorter,
-) {
-    let Sorter { unsorted, long, .. } = sorter;
+fn scatter(pairs: &[Pair], first_id: u32, spans: &mut [Span], unsorted: &mut [u32]) {
     spans.fill(Span::default());
     for pair in pairs {
         spans[(pair.a - first_id) as usize].len += 1;
@@ -330,8 +296,58 @@ fn sort_rows(
         unsorted[(span.start + span.len) as usize] = pair.b;
         span.len += 1;
     }
+}
+
+/// Sorts the `b` of pairs into rows. The first row is that of `first_id`.
+#[inline(always)]
+fn sort_rows(
+    simd: impl Simd,
+    pairs: &[Pair],
+    first_id: u32,
+    spans: &mut [Span],
+    others: &mut [u32],
+    Sorter { unsorted, long, .. }: &mut Sorter,
+) {
+    scatter(pairs, first_id, spans, unsorted);
     for span in spans {
         row::sort_into(simd, unsorted, span.range(), others, long);
+    }
+}
+
+/// Sorts pairs. The first row is that of `first_id`.
+#[inline(always)]
+fn sort_pairs(
+    simd: impl Simd,
+    pairs: &mut [Pair],
+    first_id: u32,
+    spans: &mut [Span],
+    Sorter { unsorted, long, others, .. }: &mut Sorter,
+) {
+    scatter(pairs, first_id, spans, unsorted);
+    for (a, span) in (first_id..).zip(spans) {
+        let (len, pairs) = (span.len as usize, &mut pairs[span.start as usize..]);
+        let unsorted = &unsorted[span.start as usize..];
+        match pairs.first_chunk_mut::<SHORT>() {
+            // The next rows overwrite what is behind this one.
+            Some(pairs) if len <= SHORT => {
+                let sorted = row::sorted_short(simd, unsorted, len);
+                write(a, &sorted[..4], &mut pairs[..4]);
+                if len > 4 {
+                    write(a, &sorted[4..], &mut pairs[4..]);
+                }
+            }
+            _ => {
+                row::sort_into(simd, unsorted, 0..len, others, long);
+                write(a, others, &mut pairs[..len]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn write(a: u32, others: &[u32], pairs: &mut [Pair]) {
+    for (pair, &b) in pairs.iter_mut().zip(others) {
+        *pair = Pair { a, b };
     }
 }
 

@@ -28,11 +28,17 @@ pub(super) fn sort_into(
     if len > SHORT {
         return sort_by_counting(&from[range.start..], len, &mut to[..len]);
     }
-    let sorted = simd.sorted_short(first_eight(&from[range.start..]), len);
+    let sorted = sorted_short(simd, &from[range.start..], len);
     match to.first_chunk_mut() {
         Some(to) => *to = sorted,
         None => to[..len].copy_from_slice(&sorted[..len]),
     }
+}
+
+/// Returns the first `len` ids, sorted. What comes behind these is anything.
+#[inline(always)]
+pub(super) fn sorted_short(simd: impl Simd, from: &[u32], len: usize) -> [u32; SHORT] {
+    simd.sorted_short(first_eight(from), len)
 }
 
 /// Sorts a list that mostly has few ids.
