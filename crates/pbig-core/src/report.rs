@@ -88,7 +88,7 @@ pub struct Checks {
 }
 
 /// Maximum [`Report::work`] for each box and pair, in binary logarithms of the number of boxes, for every shape, motion and history
-/// of the boxes. A pair counts if its boxes overlap, also if filters or keys exclude it. docs/ARCHITECTURE.md says for which numbers
+/// of the boxes. Changes count as boxes where they are more. A pair counts if its boxes overlap, also if filters or keys exclude it. docs/ARCHITECTURE.md says for which numbers
 /// of boxes it holds, and why.
 pub const WORK_LIMIT: u64 = 256;
 
@@ -109,7 +109,7 @@ pub struct Report {
     pub checks: Checks,
     /// The work on the CPU, in tests of codes, of which eight are made at once: a row of cells counts as 32, a node of a tree as 8, an
     /// exact test as 4, about as long as they take. Sorting boxes is not counted, but ids without a box that a search reads are, and the
-    /// budget of what was given up is. At most [`crate::WORK_LIMIT`] for each box, change and pair, times the binary logarithm of the number of boxes,
+    /// budget of what was given up is. At most [`crate::WORK_LIMIT`] for each box and pair, times the binary logarithm of the number of boxes,
     /// unless [`crate::Backend::Brute`] or an engine was asked for. It does not depend on threads, unless the call found too many pairs.
     pub work: u64,
     /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).

@@ -178,10 +178,10 @@ fn config() -> Config {
     Config { limits: Limits { max_pairs: MAX_PAIRS, ..Limits::DEFAULT }, ..Config::DEFAULT }
 }
 
-/// Returns the work of a call for each box, change and pair, in binary logarithms of the number of boxes, which
-/// [`pbig_core::WORK_LIMIT`] bounds.
+/// Returns the work of a call for each box and pair, in binary logarithms of the number of boxes, which [`pbig_core::WORK_LIMIT`]
+/// bounds. Changes count as boxes where they are more.
 pub fn ratio(report: &Report) -> f64 {
-    let boxes = report.boxes + report.changed;
+    let boxes = report.boxes.max(report.changed);
     report.work as f64 / ((boxes + report.pairs).max(1) as f64 * (boxes.max(2) as f64).log2())
 }
 
