@@ -22,7 +22,7 @@ pub(crate) const WORK_OF_NODE: u64 = 8;
 const GRID_UP_TO_LOGS_PER_BOX: u64 = 40;
 
 /// Maximum work of a join of a tree for each box, in binary logarithms of their number: streamed segment trees take about as much, 75 to
-/// 120.
+/// 270.
 const JOIN_UP_TO_LOGS_PER_BOX: u64 = 96;
 
 /// Work that each overlap of a box justifies: in a crowd each box overlaps many, and no other way is faster.
