@@ -18,7 +18,7 @@ mod sort;
 pub(crate) mod tests;
 mod walk;
 
-use crate::policy::bvh as policy;
+use crate::policy;
 use crate::simd::{Simd, dispatch};
 use crate::{Aabb, OccupiedCell};
 use node::Node;
@@ -144,7 +144,7 @@ impl BoxIndex {
 
     /// Counts nodes that look-ups have looked at. A search after them took as long as some more.
     pub(crate) fn note_look_ups(&mut self, nodes: u64, is_given_up: bool) {
-        self.looked_up += nodes + if is_given_up { policy::nodes_of_search(self.listed) } else { 0 };
+        self.looked_up += nodes + if is_given_up { policy::bvh::nodes_of_search(self.listed) } else { 0 };
     }
 
     /// Counts nodes that a query has looked at, where they can lead to a sort. Threads may lose each other's counts: an atomic addition

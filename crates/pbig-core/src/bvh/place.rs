@@ -4,7 +4,7 @@ use super::BoxIndex;
 use super::node::{LANES, NONE, Node, extent_sum};
 use super::refit::word;
 use crate::Aabb;
-use crate::policy::bvh as policy;
+use crate::policy;
 use crate::simd::dispatch;
 
 /// Children of the root below which a leaf with room is looked for. Parts for boxes of other sizes may lie in the same place.
@@ -127,7 +127,7 @@ impl BoxIndex {
             (above, at) = (at, self.nodes[at].children[lane] as usize);
         }
         let extent = extent_sum(&self.bounds[at].union(aabb));
-        let is_small = extent <= policy::GROWN_TO * extent_sum(&self.bounds[above]);
+        let is_small = extent <= policy::bvh::GROWN_TO * extent_sum(&self.bounds[above]);
         (is_small && self.room[at] > 0).then_some(at)
     }
 }

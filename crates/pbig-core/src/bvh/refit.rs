@@ -5,7 +5,7 @@ use super::node::{LANES, NONE, Node, extent_sum};
 use super::sort::{Entry, Order, sort};
 use crate::Aabb;
 use crate::parallel::{available_threads, run_parts};
-use crate::policy::{PARALLEL_FROM_BOXES, bvh as policy};
+use crate::policy::{self, PARALLEL_FROM_BOXES};
 use crate::simd::{Simd, dispatch, prefetch};
 use std::sync::atomic::Ordering;
 
@@ -63,7 +63,7 @@ impl BoxIndex {
         present: impl Iterator<Item = u32> + Clone,
     ) -> usize {
         self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
-        let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < boxes.len();
+        let is_few = |changed: &&[u32]| changed.len() * policy::bvh::REFIT_SHARE < boxes.len();
         let few = changed.filter(is_few);
         match few {
             Some(changed) => self.place(boxes, changed),
@@ -76,7 +76,7 @@ impl BoxIndex {
 
     /// Returns true if the boxes should be laid out anew, because too many have no place in the tree.
     fn has_many_loose(&self) -> bool {
-        self.loose().len() > policy::loose_leaves(self.leaves)
+        self.loose().len() > policy::bvh::loose_leaves(self.leaves)
     }
 
     /// Writes ids in the order of their places: place and id in one word.
@@ -148,13 +148,14 @@ impl BoxIndex {
     /// Chooses the number of nodes that queries look at before the next sort: as many as one sort costs if the order is bad, some
     /// more if boxes have moved, and no number if the order is as after a sort.
     fn plan_sort(&mut self) {
-        let has_many_loose = policy::FEW_LOOSE_SHARE * self.loose().len() > policy::loose_leaves(self.leaves);
-        let has_grown = self.grown * policy::GROWN_SHARE > self.end as usize;
+        let has_many_loose =
+            policy::bvh::FEW_LOOSE_SHARE * self.loose().len() > policy::bvh::loose_leaves(self.leaves);
+        let has_grown = self.grown * policy::bvh::GROWN_SHARE > self.end as usize;
         let is_bad = has_many_loose || has_grown;
-        let one = policy::nodes_for_sort(self.leaves, self.listed);
+        let one = policy::bvh::nodes_for_sort(self.leaves, self.listed);
         self.sort_after = match (is_bad, self.has_moved) {
             (true, _) => Some(one),
-            (false, true) => Some(policy::SORTS_FOR_ORDER * one),
+            (false, true) => Some(policy::bvh::SORTS_FOR_ORDER * one),
             (false, false) => None,
         };
     }
@@ -179,13 +180,13 @@ impl BoxIndex {
         self.read_all(boxes);
         // After a peak, most leaves are empty.
         let full = self.bounds[..self.leaves as usize].iter().filter(|bounds| bounds.is_valid()).count();
-        if policy::FULL_LEAVES_SHARE * full < self.leaves as usize {
+        if policy::bvh::FULL_LEAVES_SHARE * full < self.leaves as usize {
             return self.lay_out(boxes, present, Order::SORTED);
         }
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         let has_come = |id: &u32| self.places[*id as usize] == NONE && boxes[*id as usize].is_valid();
         let came: Vec<u32> = present.clone().filter(has_come).collect();
-        if came.len() > LANES * policy::loose_leaves(self.leaves) {
+        if came.len() > LANES * policy::bvh::loose_leaves(self.leaves) {
             return self.lay_out(boxes, present, Order::SORTED);
         }
         self.place(boxes, &came);
@@ -314,7 +315,7 @@ fn read_inner(simd: impl Simd, nodes: &mut [Node], bounds: &mut [Aabb], first: u
 /// Returns true, once, if a node has grown to more than twice its extents at the last sort.
 #[inline(always)]
 fn outgrows(bounds: &Aabb, extent: &mut f32) -> bool {
-    let is_grown = extent_sum(bounds) > policy::GROWN_TO * *extent;
+    let is_grown = extent_sum(bounds) > policy::bvh::GROWN_TO * *extent;
     if is_grown {
         *extent = f32::INFINITY;
     }
