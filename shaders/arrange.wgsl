@@ -4,8 +4,15 @@
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> counters: Counters;
-// Arguments of indirect dispatches: small items, large items, pairs.
-@group(0) @binding(3) var<storage, read_write> dispatches: array<u32, 9>;
+// Arguments of indirect dispatches: small items, large items.
+@group(0) @binding(3) var<storage, read_write> dispatches: array<u32, 6>;
+
+// Writes the arguments of an indirect dispatch of this number of workgroups.
+fn write_dispatch(at: u32, groups: u32) {
+    dispatches[at] = min(groups, GROUPS_PER_ROW);
+    dispatches[at + 1u] = (groups + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW;
+    dispatches[at + 2u] = 1u;
+}
 
 @compute @workgroup_size(1)
 fn arrange() {

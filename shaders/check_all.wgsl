@@ -1,23 +1,17 @@
-// Check, without a grid, for few boxes: one invocation for each pair (Avril 3.2). The output is one bit a pair (Avril 3.4)
-// or a list of pairs, whichever the host expects to be smaller.
+// Check, without a grid, for few boxes: one invocation for each pair (Avril 3.2).
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> boxes: array<DeviceBox>;
 @group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
-@group(0) @binding(4) var<storage, read_write> totals: array<atomic<u32>, 12>;
+@group(0) @binding(4) var<storage, read_write> totals: array<atomic<u32>, 8>;
 @group(0) @binding(5) var<storage, read_write> out: array<u32>;
-
-var<workgroup> bits: array<atomic<u32>, 8>;
 
 @compute @workgroup_size(LANES)
 fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let n = params.boxes;
     let all = n * (n - 1u) / 2u;
     let first = linear(group) * LANES;
-    if lane < 8u {
-        atomicStore(&bits[lane], 0u);
-    }
     if first >= all || beyond_limit(lane) {
         return;
     }
@@ -32,27 +26,15 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     var rank = 0u;
     if hit {
         rank = atomicAdd(&tally[HITS], 1u);
-        atomicOr(&bits[lane / 32u], 1u << (lane % 32u));
     }
     if lane == 0u {
         atomicStore(&tally[0], min(LANES, all - first));
     }
     workgroupBarrier();
     if lane == 0u {
-        add_tests();
-        let hits = atomicLoad(&tally[HITS]);
-        placed = Placed(NO_SPACE, 0u, 0u, 0u);
-        if has_flag(BITS) {
-            add_total(PAIRS, hits);
-        } else if hits > 0u {
-            placed = place_plain(hits);
-        }
+        placed = place();
     }
-    let at = workgroupUniformLoad(&placed).at;
-    let word = first / 32u + lane;
-    if has_flag(BITS) && lane < 8u && word < chunk.word_capacity {
-        out[word] = atomicLoad(&bits[lane]);
-    }
+    let at = workgroupUniformLoad(&placed);
     if hit && at != NO_SPACE {
         write_pair(at + 2u * rank, pair.x, pair.y);
     }

@@ -8,7 +8,7 @@
 @group(0) @binding(4) var<storage, read> entries: array<u32>;
 @group(0) @binding(5) var<storage, read> counters: Counters;
 @group(0) @binding(6) var<storage, read> large_items: array<LargeItem>;
-@group(0) @binding(7) var<storage, read_write> totals: array<atomic<u32>, 12>;
+@group(0) @binding(7) var<storage, read_write> totals: array<atomic<u32>, 8>;
 @group(0) @binding(8) var<storage, read_write> out: array<u32>;
 
 // If true, the rows of one segment get equally many pairs (PBIG 5.1). If false, a row gets all boxes after it.
@@ -116,8 +116,7 @@ fn test_partners(lane: u32, entry: u32, one: DeviceBox, s: Segments) -> u32 {
             counts.x += 1u;
             let a = box_of(entry);
             let b = box_of(staged_entries[j]);
-            if !owns(entry, staged_entries[j])
-                || (params.split > 0u && (a < params.split) == (b < params.split)) {
+            if !owns(entry, staged_entries[j]) {
                 counts.y += 1u;
                 continue;
             }
@@ -136,26 +135,6 @@ fn test_partners(lane: u32, entry: u32, one: DeviceBox, s: Segments) -> u32 {
     note_test(1u, counts.y);
     note_test(2u, counts.z);
     return hits;
-}
-
-// Decides, by one lane, how and where the workgroup's hits are written.
-fn place(item: LargeItem, s: Segments) -> Placed {
-    add_tests();
-    let hits = atomicExchange(&tally[HITS], 0u);
-    let words = 3u + atomicExchange(&tally[ROW_WORDS], 0u);
-    if hits == 0u {
-        return Placed(NO_SPACE, 0u, 0u, 0u);
-    }
-    if !has_flag(PACKED) || words > 1u + 2u * hits {
-        return place_plain(hits);
-    }
-    let at = reserve(words, hits);
-    if at != NO_SPACE {
-        out[at] = words - 3u;
-        out[at + 1u] = item.start;
-        out[at + 2u] = s.lanes | (s.staged << 16u);
-    }
-    return Placed(select(at + 3u, NO_SPACE, at == NO_SPACE), hits, words, 1u);
 }
 
 @compute @workgroup_size(LANES)
@@ -194,27 +173,19 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         let entry = stage(item, lane, s);
         let one = ordered_box(boxes[box_of(entry)]);
         let hits = test_partners(lane, entry, one, s);
-        // Words of a row: its index, its number of hits less one, and a byte for each hit.
-        let words = select(0u, (hits + 5u) / 4u, hits > 0u);
         // Algorithm 2, line 26, takes a prefix sum here. The rows may come in any order, so atomics are enough: 1 barrier
         // instead of 17.
         var rank = 0u;
-        var word_rank = 0u;
         if hits > 0u {
             rank = atomicAdd(&tally[HITS], hits);
-            word_rank = atomicAdd(&tally[ROW_WORDS], words);
         }
         workgroupBarrier();
         if lane == 0u {
-            placed = place(item, s);
+            placed = place();
         }
-        let to = workgroupUniformLoad(&placed);
-        let written = hits > 0u && to.at != NO_SPACE;
-        if written && to.packed != 0u {
-            write_row(to.at + word_rank, lane, hits, s);
-        }
-        if written && to.packed == 0u {
-            write_pairs(to.at + 2u * rank, lane, entry, s);
+        let at = workgroupUniformLoad(&placed);
+        if hits > 0u && at != NO_SPACE {
+            write_pairs(at + 2u * rank, lane, entry, s);
         }
     }
 }
@@ -230,27 +201,4 @@ fn write_pairs(start: u32, lane: u32, entry: u32, s: Segments) {
             at += 2u;
         }
     }
-}
-
-// Writes a row of a packed record, four bytes to a word.
-fn write_row(start: u32, lane: u32, hits: u32, s: Segments) {
-    var at = start;
-    var word = lane | ((hits - 1u) << 8u);
-    var shift = 16u;
-    for (var w = 0u; w < 8u; w++) {
-        var bits = mask[w];
-        while bits != 0u {
-            let k = 32u * w + firstTrailingBit(bits);
-            bits &= bits - 1u;
-            if shift == 32u {
-                out[at] = word;
-                at += 1u;
-                word = 0u;
-                shift = 0u;
-            }
-            word |= partner(lane, k, s) << shift;
-            shift += 8u;
-        }
-    }
-    out[at] = word;
 }

@@ -10,13 +10,10 @@
 @group(0) @binding(5) var<storage, read> counters: Counters;
 @group(0) @binding(6) var<storage, read> slots: array<Slot>;
 @group(0) @binding(7) var<storage, read> small_items: array<SmallItem>;
-@group(0) @binding(8) var<storage, read_write> totals: array<atomic<u32>, 12>;
+@group(0) @binding(8) var<storage, read_write> totals: array<atomic<u32>, 8>;
 @group(0) @binding(9) var<storage, read_write> out: array<u32>;
 
 var<workgroup> first_pairs: array<u32, LANES>;
-// For each slot: the number of its hits, and the first word of its record.
-var<workgroup> slot_hits: array<atomic<u32>, LANES>;
-var<workgroup> slot_at: array<u32, LANES>;
 
 // Returns the last of the item's slots that begins at or before a pair.
 fn slot_of(pair: u32, count: u32) -> u32 {
@@ -79,7 +76,7 @@ fn is_pair(one: u32, other: u32, staged: Stage) -> bool {
     let b = entry_at(other, staged);
     let i = box_of(a);
     let j = box_of(b);
-    if !owns(a, b) || (params.split > 0u && (i < params.split) == (j < params.split)) {
+    if !owns(a, b) {
         note_test(1u, 1u);
         return false;
     }
@@ -90,26 +87,12 @@ fn is_pair(one: u32, other: u32, staged: Stage) -> bool {
     return !has_flag(FILTERED) || filters_allow(filters[i], filters[j]);
 }
 
-// Decides, by one lane, how and where the workgroup's hits are written. As records they take `words` words.
-fn place(words: u32) -> Placed {
-    add_tests();
-    let hits = atomicLoad(&tally[HITS]);
-    if hits == 0u {
-        return Placed(NO_SPACE, 0u, 0u, 0u);
-    }
-    if !has_flag(PACKED) || 1u + 2u * hits < words {
-        return place_plain(hits);
-    }
-    return Placed(reserve(words, hits), hits, words, 1u);
-}
-
 @compute @workgroup_size(LANES)
 fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let index = linear(group);
     if index >= chunk.small_items || chunk.first_small + index >= counters.small_items {
         return;
     }
-    atomicStore(&slot_hits[lane], 0u);
     if beyond_limit(lane) {
         return;
     }
@@ -121,53 +104,30 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     let staged = stage(item, lane);
     workgroupBarrier();
     var hit = false;
-    var slot = 0u;
     var start = 0u;
     var pair = vec2<u32>(0u);
     if lane < item.pairs {
-        slot = slot_of(item.first_pair + lane, item.slots);
-        let cell = slots[item.slot + slot];
+        let cell = slots[item.slot + slot_of(item.first_pair + lane, item.slots)];
         start = cell.start;
         pair = pair_at(item.first_pair + lane - cell.first_pair, cell.shape & 0xffffu);
         hit = is_pair(start + pair.x, start + pair.y, staged);
     }
     // The hits may come in any order, so no prefix sum is needed.
     var rank = 0u;
-    var slot_rank = 0u;
     if hit {
         rank = atomicAdd(&tally[HITS], 1u);
-        slot_rank = atomicAdd(&slot_hits[slot], 1u);
     }
     if lane == 0u {
         atomicStore(&tally[0], item.pairs);
     }
     workgroupBarrier();
-    var words = 0u;
-    if has_flag(PACKED) {
-        // Each lane takes a slot: three words, and one for each hit.
-        let hits = atomicLoad(&slot_hits[lane]);
-        slot_at[lane] = block_scan(select(0u, 3u + hits, hits > 0u), lane);
-        words = block_sum();
-    }
     if lane == 0u {
-        placed = place(words);
+        placed = place();
     }
-    let to = workgroupUniformLoad(&placed);
-    if !hit || to.at == NO_SPACE {
-        return;
-    }
-    if to.packed == 0u {
+    let at = workgroupUniformLoad(&placed);
+    if hit && at != NO_SPACE {
         let a = entry_at(start + pair.x, staged);
         let b = entry_at(start + pair.y, staged);
-        write_pair(to.at + 2u * rank, box_of(a), box_of(b));
-        return;
+        write_pair(at + 2u * rank, box_of(a), box_of(b));
     }
-    let record = to.at + slot_at[slot];
-    if slot_rank == 0u {
-        out[record] = atomicLoad(&slot_hits[slot]);
-        out[record + 1u] = start;
-        out[record + 2u] = 0u;
-    }
-    // A row with one partner: the places of both in the only segment.
-    out[record + 3u + slot_rank] = pair.x | (pair.y << 16u);
 }

@@ -1,4 +1,4 @@
-// Sort, step 2: counts the pairs of each first box.
+// Sort, step 1: counts the pairs of each first box.
 
 @group(0) @binding(0) var<storage, read> totals: Totals;
 @group(0) @binding(1) var<storage, read> out: array<u32>;

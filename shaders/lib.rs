@@ -135,7 +135,6 @@ const CELLS: &str = include_str!("shared/cells.wgsl");
 const FITS: &str = include_str!("shared/fits.wgsl");
 const SCANNED: &str = include_str!("shared/scanned.wgsl");
 const ENDS: &str = include_str!("shared/ends.wgsl");
-const DISPATCH: &str = include_str!("shared/dispatch.wgsl");
 const ROWS: &str = include_str!("shared/rows.wgsl");
 const LEADERS: &str = include_str!("shared/leaders.wgsl");
 const PIECES: &str = include_str!("shared/pieces.wgsl");
@@ -176,9 +175,9 @@ kernels! {
     /// Map: scatters boxes into cells.
     SCATTER Map "scatter" [ENDS, CELLS] (Params, Located, Sums, Counters, Cells, Entries);
     /// Schedule: computes the sizes of the dispatches that follow.
-    ARRANGE Map "arrange" [FITS, DISPATCH] (Params, Chunk, Counters, Dispatches);
+    ARRANGE Map "arrange" [FITS] (Params, Chunk, Counters, Dispatches);
     /// Check: tests the pairs of small cells.
-    CHECK_SMALL Check "check_small" [FLOATS, BLOCK_SCAN, PAIR_INDEX, EMIT]
+    CHECK_SMALL Check "check_small" [FLOATS, PAIR_INDEX, EMIT]
         (Params, Chunk, Boxes, Filters, Entries, Counters, Slots, SmallItems, Totals, Out);
     /// Check: tests the pairs of large cells.
     CHECK_LARGE Check "check_large" [FLOATS, EMIT]
@@ -187,8 +186,6 @@ kernels! {
     CHECK_ALL Check "check_all" [FLOATS, PAIR_INDEX, EMIT] (Params, Chunk, Boxes, Filters, Totals, Out);
     /// Check: says how many pairs stay on the device, and whether they are all.
     CONCLUDE Check "conclude" [FITS] (Params, Chunk, Counters, Totals, PairCount);
-    /// Sort: computes the sizes of the dispatches that follow.
-    ARRANGE_ROWS Sort "arrange_rows" [ROWS, DISPATCH] (Params, Chunk, Counters, Totals, Dispatches, LongRows);
     /// Sort: counts the pairs of each first box.
     COUNT_PAIRS Sort "count_pairs" [LEADERS] (Totals, Out, Rows);
     /// Sort: groups the pairs by first box.

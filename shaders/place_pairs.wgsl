@@ -1,4 +1,4 @@
-// Sort, step 3: writes each pair into the row of its first box. The order within a row is the device's.
+// Sort, step 2: writes each pair into the row of its first box. The order within a row is the device's.
 
 @group(0) @binding(0) var<storage, read> totals: Totals;
 @group(0) @binding(1) var<storage, read> out: array<u32>;

@@ -1,4 +1,4 @@
-// Sort, step 5: orders the pairs of long rows by window. A workgroup moves a piece of a row, and reserves places in each window
+// Sort, step 4: orders the pairs of long rows by window. A workgroup moves a piece of a row, and reserves places in each window
 // once. Only second boxes are written.
 
 @group(0) @binding(0) var<uniform> params: Params;

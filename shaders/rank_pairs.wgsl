@@ -1,4 +1,4 @@
-// Sort, step 4, for a chunk of the pairs: writes each pair of a short row to its place, behind the pairs of the row whose second box is smaller. Counts
+// Sort, step 3, for a chunk of the pairs: writes each pair of a short row to its place, behind the pairs of the row whose second box is smaller. Counts
 // the pairs of long rows by window, and cuts these rows into pieces.
 
 @group(0) @binding(0) var<uniform> params: Params;

@@ -1,4 +1,4 @@
-// Sort, step 6: sorts the windows of long rows, each through a bitmap. The pieces of a row share its windows.
+// Sort, step 5: sorts the windows of long rows, each through a bitmap. The pieces of a row share its windows.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> grouped: array<u32>;

@@ -98,6 +98,27 @@ pub(crate) fn pbig_grid(boxes: &[Aabb], options: &GpuOptions, rule: CellRule) ->
     Ok(found)
 }
 
+/// Number of boxes of a segment, whose places are a byte each (PBIG 5.2).
+const SEGMENT: u32 = 256;
+
+/// Returns the words of all pairs as the paper's records, which name a cell, a segment and a place. Pairs of oversize boxes are left out.
+pub(crate) fn record_words(boxes: &[Aabb], options: &GpuOptions) -> u64 {
+    let plan = PbigPlan::new(&Summary::of(boxes), options, CellRule::Objective);
+    let grid = PbigGrid::new(&plan, boxes);
+    (0..grid.offsets.len() - 1).map(|key| words_of_cell(&grid.hits(&plan, key))).sum()
+}
+
+/// Returns the words of a cell's pairs as records, or as a list if that takes fewer. Cell and segments take three words; a row
+/// takes a byte for its place, one for the number of its partners, and one for each.
+fn words_of_cell(hits: &[(u32, u32)]) -> u64 {
+    let mut rows: Vec<_> = hits.iter().map(|(i, j)| ([i / SEGMENT, j / SEGMENT], *i)).collect();
+    rows.sort_unstable();
+    let words = |row: &[([u32; 2], u32)]| (row.len() as u64 + 2).div_ceil(4);
+    let of_rows: u64 = rows.chunk_by(|a, b| a == b).map(words).sum();
+    let records = rows.chunk_by(|a, b| a.0 == b.0).count() as u64;
+    (3 * records + of_rows).min(1 + 2 * hits.len() as u64)
+}
+
 /// A box with the cells that it touches, both ends included.
 #[derive(Clone, Copy, Debug)]
 struct GridMember {
@@ -162,6 +183,27 @@ impl PbigGrid {
         }
         Self { offsets, entries, members, oversize }
     }
+
+    /// Returns the entries of a cell.
+    fn cell(&self, key: usize) -> &[u32] {
+        &self.entries[self.offsets[key] as usize..self.offsets[key + 1] as usize]
+    }
+
+    /// Returns the pairs that a cell owns, by the places of their boxes in it.
+    fn hits(&self, plan: &PbigPlan, key: usize) -> Vec<(u32, u32)> {
+        let member = |place: u32| &self.members[self.cell(key)[place as usize] as usize];
+        let is_hit = |&(i, j): &(u32, u32)| {
+            let (a, b) = (member(i), member(j));
+            owner(plan, a, b) == key && a.aabb.overlaps(&b.aabb)
+        };
+        let n = self.cell(key).len() as u32;
+        (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))).filter(is_hit).collect()
+    }
+}
+
+/// Returns the key of the cell that reports a pair.
+fn owner(plan: &PbigPlan, a: &GridMember, b: &GridMember) -> usize {
+    plan.key(std::array::from_fn(|k| a.low[k].max(b.low[k])))
 }
 
 /// Returns the valid boxes with their cells, and the oversize boxes.
@@ -180,8 +222,7 @@ fn select(plan: &PbigPlan, boxes: &[Aabb]) -> (Vec<GridMember>, Vec<GridMember>)
 impl PbigFound {
     /// Tests the pairs of a cell.
     fn check_cell(&mut self, grid: &PbigGrid, key: usize, small_cell: u32) {
-        let range = grid.offsets[key] as usize..grid.offsets[key + 1] as usize;
-        let entries = &grid.entries[range];
+        let entries = grid.cell(key);
         let n = entries.len() as u32;
         let mut check = |i, j| self.check_in_cell(grid, key, entries[i as usize], entries[j as usize]);
         if n <= small_cell {
@@ -196,7 +237,7 @@ impl PbigFound {
     /// Tests two members in a cell that both touch, if it is the owner of their pair.
     fn check_in_cell(&mut self, grid: &PbigGrid, key: usize, i: u32, j: u32) {
         let (a, b) = (&grid.members[i as usize], &grid.members[j as usize]);
-        if self.plan.key(std::array::from_fn(|k| a.low[k].max(b.low[k]))) == key {
+        if owner(&self.plan, a, b) == key {
             self.test(a, b);
         } else {
             self.checks.made += 1;
@@ -269,6 +310,28 @@ mod tests {
 
     fn cubes(n: usize, edge: f32) -> Vec<Aabb> {
         vec![Aabb::new([0.0; 3], [edge; 3]); n]
+    }
+
+    #[test]
+    fn records_by_hand() {
+        // One pair as a list; two rows of two and one partners; a row whose partners lie in two segments.
+        assert_eq!(words_of_cell(&[(0, 1)]), 3);
+        assert_eq!(words_of_cell(&[(0, 1), (0, 2), (1, 2)]), 3 + 1 + 1);
+        let row: Vec<_> = (1..300).map(|j| (0, j)).collect();
+        assert_eq!(words_of_cell(&row), 3 + 257u64.div_ceil(4) + 3 + 46u64.div_ceil(4));
+    }
+
+    #[test]
+    fn records_take_a_byte_a_pair_in_a_crowd_and_more_than_a_list_elsewhere() {
+        let bytes_a_pair = |boxes: &[Aabb]| {
+            let pairs = oracle::pairs(boxes).len() as f64;
+            4.0 * record_words(boxes, &GpuOptions::DEFAULT) as f64 / pairs
+        };
+        let crowd = bytes_a_pair(&cubes(1000, 1.0));
+        assert!((1.0..1.1).contains(&crowd), "{crowd}");
+        let couples: Vec<_> =
+            (0..1000).map(|i| Aabb::from_center([(i / 2 * 4) as f32; 3], [1.0; 3])).collect();
+        assert!(bytes_a_pair(&couples) > 8.0, "{}", bytes_a_pair(&couples));
     }
 
     #[test]

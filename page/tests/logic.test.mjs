@@ -120,7 +120,7 @@ test("the end of a simulation is not a failure of its calls", async () => {
 /** Returns rounds with these times of the GPU, whose other times are 1 and whose bytes are their number. */
 function rounds(gpu) {
     const times = { cpu_ms: 6, wait_ms: 1, upload_ms: 1, plan_ms: 0, record_ms: 1, decode_ms: 1 };
-    const bytesOf = (round) => ({ uploaded_bytes: round, downloaded_bytes: 1_234_567, device_bytes: 7, compression: 1 / 3 });
+    const bytesOf = (round) => ({ uploaded_bytes: round, downloaded_bytes: 1_234_567, device_bytes: 7 });
     return gpu.map((gpu_ms, round) => ({ ...times, gpu_ms, ...bytesOf(round) }));
 }
 
@@ -139,7 +139,7 @@ test("the CSV has conditions, exact counts, and a column for each kernel of any 
     const csv = csvOf({ adapter: "a GPU", software: false }, [row(10_000, {}), row(1_000_000, { scan: 0.5 })]);
     const [first, second, columns, ...lines] = csv.trimEnd().split("\n");
     assert.deepEqual([first, second], ["# adapter: a GPU", "# software: false"]);
-    const searches = "set,boxes,pairs,cpu_ms,gpu_ms,cpu_over_gpu,wait_ms,uploaded_bytes,downloaded_bytes,device_bytes,compression,";
+    const searches = "set,boxes,pairs,cpu_ms,gpu_ms,cpu_over_gpu,wait_ms,uploaded_bytes,downloaded_bytes,device_bytes,";
     assert.ok(columns.startsWith(searches) && columns.endsWith(",pairs_equal,scan_ms"), columns);
     assert.equal(lines[0], "uniform,10000,5,6,3.1416,1.9099,1,0,1234567,7,0.33333,1,0,1,1,yes,");
     assert.ok(lines[1].startsWith("uniform,1000000,") && lines[1].endsWith(",yes,0.5"), lines[1]);

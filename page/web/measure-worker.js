@@ -57,9 +57,9 @@ async function measureRound(benchmark, round) {
 function reportOf(benchmark) {
     const report = benchmark.report();
     const { wait_ms, upload_ms, plan_ms, record_ms, decode_ms } = report;
-    const { uploaded_bytes, downloaded_bytes, device_bytes, compression } = report;
+    const { uploaded_bytes, downloaded_bytes, device_bytes } = report;
     report.free();
-    return { wait_ms, upload_ms, plan_ms, record_ms, decode_ms, uploaded_bytes, downloaded_bytes, device_bytes, compression };
+    return { wait_ms, upload_ms, plan_ms, record_ms, decode_ms, uploaded_bytes, downloaded_bytes, device_bytes };
 }
 
 /** Returns the milliseconds of each kernel in the last of some rounds; none if the GPU does not tell the time. */

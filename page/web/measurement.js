@@ -15,7 +15,7 @@ export const KERNEL_ROUNDS = 2;
 // The first columns are those of the searches of `pbig bench gpu` without `steady_ms` and the prediction, the next ones those of its table of the host's part.
 const COLUMNS = [
     ["set", "boxes", "pairs", "cpu_ms", "gpu_ms", "cpu_over_gpu", "wait_ms", "uploaded_bytes", "downloaded_bytes"],
-    ["device_bytes", "compression", "upload_ms", "plan_ms", "record_ms", "decode_ms", "pairs_equal"],
+    ["device_bytes", "upload_ms", "plan_ms", "record_ms", "decode_ms", "pairs_equal"],
 ].flat();
 
 /** Returns the number of rounds with so many boxes. The first one compiles and allocates, and does not count. */
@@ -38,10 +38,10 @@ export function median(numbers) {
 /** Returns the row of a number of boxes, from the times and the report of each round that counts. */
 export function rowOf({ boxes, pairs, rounds, kernels, isEqual }) {
     const medianOf = (name) => median(rounds.map((round) => round[name]));
-    const { uploaded_bytes, downloaded_bytes, device_bytes, compression } = rounds.at(-1);
+    const { uploaded_bytes, downloaded_bytes, device_bytes } = rounds.at(-1);
     const times = ["cpu_ms", "gpu_ms", "wait_ms", "upload_ms", "plan_ms", "record_ms", "decode_ms"];
     const row = Object.fromEntries(times.map((name) => [name, medianOf(name)]));
-    const bytes = { uploaded_bytes, downloaded_bytes, device_bytes, compression };
+    const bytes = { uploaded_bytes, downloaded_bytes, device_bytes };
     const pairs_equal = isEqual ? "yes" : DIFFERENT;
     return { set: SET, boxes, pairs, ...row, cpu_over_gpu: row.cpu_ms / row.gpu_ms, ...bytes, pairs_equal, kernels };
 }

@@ -1,14 +1,10 @@
-// Emit: counts and output of the check kernels. docs/PAIR_FORMAT.md defines the words.
+// Emit: counts and output of the check kernels. A pair is two words: the smaller index, the larger one.
 
 // Indices into `totals`, see Totals. Each count has a low and a high half, because pairs may be more than 2^32.
 const WORDS = 0u;
-const PAIRS = 1u;
-const MADE = 2u;
-const REDUNDANT = 3u;
-const OVERLAPS = 4u;
-
-// The mark of a record of plain pairs.
-const PLAIN = 0x80000000u;
+const MADE = 1u;
+const REDUNDANT = 2u;
+const OVERLAPS = 3u;
 
 fn add_total(index: u32, amount: u32) -> u32 {
     let before = atomicAdd(&totals[2u * index], amount);
@@ -26,23 +22,9 @@ fn has_flag(flag: u32) -> bool {
 // Place of output that does not fit: nothing is written.
 const NO_SPACE = 0xffffffffu;
 
-// Reserves words for the workgroup (PBIG algorithm 2, line 27), by one lane: for plain pairs one atomic operation in all. The
-// counter runs past the capacity, so the host knows how many words are needed. Records do not tell the number of pairs.
-fn reserve(words: u32, pairs: u32) -> u32 {
-    let at = add_total(WORDS, words);
-    if has_flag(PACKED) {
-        add_total(PAIRS, pairs);
-    }
-    let fits = at <= chunk.word_capacity && words <= chunk.word_capacity - at;
-    return select(NO_SPACE, at, fits);
-}
-
 // Returns both halves of the number of pairs so far. They are read one after the other. A carry in between can only happen
 // long after the output has overflowed.
 fn pairs_so_far() -> vec2<u32> {
-    if has_flag(PACKED | BITS) {
-        return vec2<u32>(atomicLoad(&totals[2u * PAIRS]), atomicLoad(&totals[2u * PAIRS + 1u]));
-    }
     let low = atomicLoad(&totals[2u * WORDS]);
     let high = atomicLoad(&totals[2u * WORDS + 1u]);
     return vec2<u32>((low >> 1u) | (high << 31u), high >> 1u);
@@ -64,10 +46,9 @@ fn beyond_limit(lane: u32) -> bool {
     return workgroupUniformLoad(&is_over_limit) != 0u;
 }
 
-// Counts of the workgroup: tests made, redundant tests, overlaps; hits; words of rows.
+// Counts of the workgroup: tests made, redundant tests, overlaps; hits.
 const HITS = 3u;
-const ROW_WORDS = 4u;
-const TALLIES = 5u;
+const TALLIES = 4u;
 var<workgroup> tally: array<atomic<u32>, TALLIES>;
 
 // Counts a test of a lane, if tests are counted.
@@ -90,25 +71,20 @@ fn add_tests() {
     }
 }
 
-// Place of the workgroup's output, which one lane decides for all.
-struct Placed {
-    at: u32,
-    hits: u32,
-    words: u32,
-    // 1 for a record of rows, 0 for plain pairs.
-    packed: u32,
-}
+// First word of the workgroup's output, which one lane decides for all.
+var<workgroup> placed: u32;
 
-var<workgroup> placed: Placed;
-
-// Reserves plain pairs, behind a mark if the output has records.
-fn place_plain(hits: u32) -> Placed {
-    let mark = u32(has_flag(PACKED));
-    let at = reserve(mark + 2u * hits, hits);
-    if mark != 0u && at != NO_SPACE {
-        out[at] = PLAIN | hits;
+// Adds the tests to the totals, and reserves words for the workgroup's hits (PBIG algorithm 2, line 27), by one lane after a barrier:
+// one atomic operation in all. The counter runs past the capacity, so the host knows how many words are needed.
+fn place() -> u32 {
+    add_tests();
+    let words = 2u * atomicExchange(&tally[HITS], 0u);
+    if words == 0u {
+        return NO_SPACE;
     }
-    return Placed(select(at + mark, NO_SPACE, at == NO_SPACE), hits, 2u * hits, 0u);
+    let at = add_total(WORDS, words);
+    let fits = at <= chunk.word_capacity && words <= chunk.word_capacity - at;
+    return select(NO_SPACE, at, fits);
 }
 
 fn write_pair(at: u32, a: u32, b: u32) {

@@ -11,14 +11,10 @@ const NO_LEVEL = 0xffffffffu;
 
 // Bits of Params.flags.
 const FILTERED = 1u;
-const PACKED = 2u;
-const BITS = 4u;
-// Plain pairs are sorted, if they fit one buffer.
-const SORTED = 8u;
 // The checks count redundant tests and overlaps.
-const COUNTED = 16u;
+const COUNTED = 2u;
 // There is no plan, so nothing is searched: the boxes live on the device, and were not measured yet.
-const UNPLANNED = 32u;
+const UNPLANNED = 4u;
 
 // An AABB whose coordinates are integers in the order of the floats. Comparisons of integers are exact on every device,
 // whatever it does to denormals, infinities and NaN. An invalid box has all of `low` above all of `high`.
@@ -66,17 +62,15 @@ struct Params {
     // Number of column segments of a large work item.
     columns: u32,
     flags: u32,
-    // If not 0: only pairs of a box below `split` and a box from `split` on are wanted.
-    split: u32,
     entry_capacity: u32,
     slot_capacity: u32,
     small_capacity: u32,
     large_capacity: u32,
-    // Number of pairs that can be sorted.
-    pair_capacity: u32,
     // Counters.tests beyond which nothing is checked: the grid was made for other boxes.
     most_tests: u32,
-    unused: u32,
+    unused0: u32,
+    unused1: u32,
+    unused2: u32,
     level: array<Level, MAX_LEVELS>,
 }
 
@@ -145,15 +139,12 @@ struct Counters {
     too_many_tests: u32,
 }
 
-// Counts of the checks, in two halves each, and 1 if the pairs are sorted.
+// Counts of the checks, in two halves each.
 struct Totals {
     words: vec2<u32>,
-    pairs: vec2<u32>,
     made: vec2<u32>,
     redundant: vec2<u32>,
     overlaps: vec2<u32>,
-    sorted: u32,
-    unused: u32,
 }
 
 // Values of PairCount.status: all pairs are there; there was no plan yet; a list or the pairs did not fit; the plan was made for

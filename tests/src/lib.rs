@@ -4,7 +4,7 @@ pub use pbig_harness::boxes::shifted;
 pub use pbig_harness::corpus::{Case, corpus, difference};
 
 use pbig_core::{Aabb, Backend, BroadPhase, Config, Engine, Finder, PairDevice, ProxyFilter};
-use pbig_gpu::{Coding, GpuOptions};
+use pbig_gpu::GpuOptions;
 use pbig_harness::boxes::BoxSet;
 use pbig_harness::options;
 use std::io::Write;
@@ -124,11 +124,8 @@ pub fn on_cpu() -> [(&'static str, Config); 4] {
 
 /// Every way to find all pairs, by name.
 pub fn strategies() -> Vec<(&'static str, Way)> {
-    let on_gpu = [
-        ("gpu", Config { backend: Backend::Device, ..Config::DEFAULT }.into()),
-        ("gpu grid", gpu(Coding::Plain)),
-        ("gpu grid packed", gpu(Coding::Packed)),
-    ];
+    let on_gpu =
+        [("gpu", Config { backend: Backend::Device, ..Config::DEFAULT }.into()), ("gpu grid", gpu())];
     let all = on_cpu().map(|(name, config)| (name, config.into())).into_iter().chain(on_gpu);
     all.filter(|(_, way)| may_run(way)).collect()
 }
@@ -145,8 +142,8 @@ pub fn engines() -> Vec<(&'static str, Way)> {
 }
 
 /// The grid on the GPU, for sets of every size.
-pub fn gpu(coding: Coding) -> Way {
-    let gpu = GpuOptions { coding, all_pairs_up_to: 0, count_tests: true, ..GpuOptions::DEFAULT };
+pub fn gpu() -> Way {
+    let gpu = GpuOptions { all_pairs_up_to: 0, count_tests: true, ..GpuOptions::DEFAULT };
     Way { config: Config { backend: Backend::Device, ..Config::DEFAULT }, gpu }
 }
 

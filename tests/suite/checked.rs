@@ -1,7 +1,6 @@
 //! A world whose every call of the broad phase is checked beside stock and the oracle.
 
 use pbig_core::{Backend, Config, Engine};
-use pbig_gpu::Coding;
 use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
 use pbig_tests::Way;
@@ -45,7 +44,7 @@ pub(crate) fn on_cpu() -> [Config; 2] {
 
 /// With its grid.
 pub(crate) fn on_gpu() -> Way {
-    pbig_tests::gpu(Coding::Plain).with(|it| it.margin = PbigConfig::DEFAULT.margin)
+    pbig_tests::gpu().with(|it| it.margin = PbigConfig::DEFAULT.margin)
 }
 
 /// Runs a test on every backend, each time with a new world.

@@ -1,7 +1,6 @@
 //! Contract 1: every strategy returns the oracle's pairs, sorted, for all boxes and thread counts.
 
 use pbig_core::{Aabb, Backend, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
-use pbig_gpu::Coding;
 use pbig_harness::hard::shapes;
 use pbig_tests::{Way, corpus, difference, gpu, may_run, on_threads, set, shifted, strategies};
 
@@ -168,7 +167,7 @@ fn points_among_identical_ones_cost_no_more_than_those() {
 /// In each of three calls of one finder, which has learned from the calls before.
 fn checks_at_most(most: u64, boxes: &[Aabb]) {
     // On a GPU a box has an entry in each of about eight cells.
-    let all = [(Config::DEFAULT.into(), most), (gpu(Coding::Auto), 8 * most)];
+    let all = [(Config::DEFAULT.into(), most), (gpu(), 8 * most)];
     for (way, most) in all.into_iter().filter(|(way, _): &(Way, _)| may_run(way)) {
         let mut finder = way.finder();
         for call in 0..3 {

@@ -8,12 +8,13 @@ mod work;
 
 use pbig_core::{
     Aabb, Backend, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order, Pair,
-    PairDevice, ProxyFilter, SearchRequest,
+    PairDevice, SearchRequest,
 };
-use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
-use pbig_tests::{Way, difference, gpu, needs_gpu};
+use pbig_gpu::{GpuFinder, GpuOptions, adapters};
+use pbig_tests::{Way, difference, needs_gpu};
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
+use std::time::Duration;
 
 fn set(name: &str, n: usize) -> Vec<Aabb> {
     pbig_tests::set(name, n, 5)
@@ -22,7 +23,7 @@ fn set(name: &str, n: usize) -> Vec<Aabb> {
 /// Returns settings for a device that always makes a grid.
 fn with(options: GpuOptions) -> Way {
     let gpu = GpuOptions { all_pairs_up_to: 0, count_tests: true, time_kernels: true, ..options };
-    Way { gpu, ..pbig_tests::gpu(options.coding) }
+    Way { gpu, ..pbig_tests::gpu() }
 }
 
 /// As [`with`], on a given device.
@@ -54,83 +55,50 @@ fn lists_that_begin_far_too_small_lose_nothing() {
     for (name, boxes) in
         [("uniform", set("uniform", 20_000)), ("pile", set("pile", 3000)), ("identical", cubes(1200))]
     {
-        let wanted = on_cpu(&boxes);
-        for coding in [Coding::Plain, Coding::Packed] {
-            let tiny = GpuOptions { first_bytes: 0, coding, ..GpuOptions::DEFAULT };
-            let mut finder = with(tiny).finder();
-            let (pairs, report) = find(&mut finder, &boxes);
-            assert_eq!(difference(&pairs, &wanted), None, "{name}, {coding:?}");
-            assert!(report.repeats > 0, "{name}: nothing was too small");
-            let (_, report) = find(&mut finder, &boxes);
-            assert_eq!(report.repeats, 0, "{name}: the second call has the room the first one needed");
-        }
+        let mut finder = with(GpuOptions { first_bytes: 0, ..GpuOptions::DEFAULT }).finder();
+        let (pairs, report) = find(&mut finder, &boxes);
+        assert_eq!(difference(&pairs, &on_cpu(&boxes)), None, "{name}");
+        assert!(report.repeats > 0, "{name}: nothing was too small");
+        let (_, report) = find(&mut finder, &boxes);
+        assert_eq!(report.repeats, 0, "{name}: the second call has the room the first one needed");
     }
 }
 
+/// Boxes, entries of cells, and pairs: each list alone.
 #[test]
-fn sets_beyond_the_limits_of_a_device_are_split_and_complete() {
+fn a_set_beyond_the_limits_of_a_device_is_the_cpus() {
     needs_gpu!();
-    // 1 MiB holds 37,449 boxes, and no more than 131,072 plain pairs.
-    let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
-    let mut with_ground = set("pile", 50_000);
-    with_ground.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, 0.0, f32::INFINITY]));
-    for (name, boxes, parts) in [
-        ("uniform", set("uniform", 120_000), 7),
-        ("gaussian", set("gaussian", 100_000), 6),
-        ("pile with ground", with_ground, 3),
-        ("identical", cubes(1500), 1),
+    let options = GpuOptions { max_bytes: 1 << 20, pause: Duration::from_secs(3600), ..GpuOptions::DEFAULT };
+    let fine = GpuOptions { boxes_per_cell: 1.0, ..options };
+    for (what, boxes, options) in [
+        ("boxes", set("unit", 50_000), options),
+        ("entries", set("pile", 30_000), fine),
+        ("out", cubes(1500), options),
     ] {
-        let wanted = on_cpu(&boxes);
-        for coding in [Coding::Plain, Coding::Packed] {
-            let (pairs, report) = find(&mut with(GpuOptions { coding, ..options }).finder(), &boxes);
-            assert_eq!(difference(&pairs, &wanted), None, "{name}, {coding:?}");
-            assert!(report.parts >= parts, "{name}: {} parts", report.parts);
-        }
-        let filter = |i: u32| ProxyFilter { body: i / 3, mask: 1 << (i % 5), ..ProxyFilter::ALL };
-        let filters: Vec<_> = (0..boxes.len() as u32).map(filter).collect();
-        let [found, wanted] = [with(options).finder(), Finder::default()]
-            .map(|mut finder| finder.find_filtered(&boxes, &filters).expect("within the limits").to_vec());
-        assert!(!wanted.is_empty() && found == wanted, "{name}, filtered");
+        let mut finder = with(options).finder();
+        assert_eq!(difference(finder.find(&boxes).expect("few pairs"), &on_cpu(&boxes)), None, "{what}");
+        let why = finder.report().fallback.clone().expect("a list is too long");
+        let limit = "but the device or GpuOptions::max_bytes allows 10485";
+        assert!(why.contains(what) && why.contains(limit), "{what}: {why}");
+        // That is no failure: there is no pause.
+        let few = set("unit", 700);
+        assert_eq!(difference(&find(&mut finder, &few).0, &on_cpu(&few)), None, "{what}");
     }
 }
 
-/// Contract: the limit of pairs is that of the call, not of its parts.
 #[test]
-fn parts_of_a_call_share_its_limit_of_pairs() {
+fn a_call_may_have_as_many_pairs_as_its_limit_and_not_one_more() {
     needs_gpu!();
-    let boxes = set("uniform", 70_000);
-    let all = on_cpu(&boxes).len() as u64;
-    let adapter = adapters().into_iter().next().expect("an adapter");
-    let small = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
-    let one = GpuFinder::on(&adapter).expect("a device").with_options(small);
-    let two = GpuFinders::on_all(&[adapter.clone(), adapter]).expect("devices");
-    for mut device in [Box::new(one) as Box<dyn PairDevice>, Box::new(two)] {
+    let mut gpu = GpuFinder::new().expect("an adapter");
+    for boxes in [set("uniform", 70_000), set("pile", 500)] {
+        let all = on_cpu(&boxes).len() as u64;
         for (max_pairs, wanted) in [(all, Ok(())), (all - 1, Err(DeviceFailure::TooManyPairs))] {
             let request = SearchRequest { boxes: &boxes, filters: None, is_sorted: false, max_pairs };
             let mut found = DeviceFound::default();
-            assert_eq!(device.find_all(&request, &mut found), wanted);
-            assert!(wanted.is_err() || found.report.parts > 1, "{} parts", found.report.parts);
+            assert_eq!(gpu.find_all(&request, &mut found), wanted);
+            assert!(wanted.is_err() || found.pairs.len() as u64 == all);
         }
     }
-}
-
-#[test]
-fn lists_that_exceed_a_buffer_split_the_set_and_are_remembered() {
-    needs_gpu!();
-    // The boxes fit, but their entries, some twenty each, do not.
-    let boxes = set("pile", 30_000);
-    let options = GpuOptions { max_bytes: 1 << 20, boxes_per_cell: 1.0, ..GpuOptions::DEFAULT };
-    let mut finder = with(options).finder();
-    let wanted = on_cpu(&boxes);
-    for call in 0..2 {
-        let (pairs, report) = find(&mut finder, &boxes);
-        assert_eq!(difference(&pairs, &wanted), None);
-        assert!(report.parts > 1, "call {call}: {} parts", report.parts);
-    }
-    let few = set("unit", 9000);
-    let (pairs, report) = find(&mut finder, &few);
-    assert_eq!(difference(&pairs, &on_cpu(&few)), None);
-    assert_eq!(report.parts, 1, "a small set is not cut because a large one was");
 }
 
 #[test]
@@ -147,11 +115,9 @@ fn a_device_that_really_allows_little_is_enough() {
     let (device, queue) = device.expect("a device with small limits");
     let device = GpuFinder::from_device(device, queue).expect("small limits are enough");
     let mut finder = with_device(GpuOptions::DEFAULT, device);
-    for boxes in [set("gaussian", 60_000), cubes(1500)] {
-        for call in 0..2 {
-            let (pairs, report) = find(&mut finder, &boxes);
-            assert_eq!(difference(&pairs, &on_cpu(&boxes)), None);
-            assert!(boxes.len() < 2000 || report.parts > 1, "call {call}: {} parts", report.parts);
+    for boxes in [set("unit", 20_000), cubes(500)] {
+        for _ in 0..2 {
+            assert_eq!(difference(&find(&mut finder, &boxes).0, &on_cpu(&boxes)), None);
         }
     }
 }
@@ -167,8 +133,6 @@ fn every_switch_gives_the_same_bytes() {
         let chunks = GpuOptions { chunk: [3, 2], first_bytes: 0, ..usual };
         for options in [
             GpuOptions { load_balancing: false, ..usual },
-            GpuOptions { coding: Coding::Plain, ..usual },
-            GpuOptions { coding: Coding::Packed, ..usual },
             chunks,
             GpuOptions { pipelining: false, ..chunks },
         ] {
@@ -183,59 +147,18 @@ fn every_switch_gives_the_same_bytes() {
 }
 
 #[test]
-fn a_small_scene_needs_no_grid_and_may_answer_in_bits() {
+fn a_small_scene_needs_no_grid() {
     needs_gpu!();
-    let boxes = cubes(300);
-    let wanted = on_cpu(&boxes);
-    for (coding, downloaded) in [(Coding::Packed, 300 * 299 / 2 / 8), (Coding::Plain, wanted.len() * 8)] {
-        let options = GpuOptions { coding, ..GpuOptions::DEFAULT };
-        let mut finder = Way { gpu: options, ..gpu(coding) }.finder();
-        let (pairs, _) = find(&mut finder, &boxes);
-        assert_eq!(difference(&pairs, &wanted), None, "{coding:?}");
-        let (_, report) = find(&mut finder, &boxes);
-        assert!(report.downloaded as usize >= downloaded, "{coding:?}: {}", report.downloaded);
-        assert!(
-            (report.downloaded as usize) < downloaded * 5 / 4 + 2048,
-            "{coding:?}: {}",
-            report.downloaded
-        );
-    }
-}
-
-#[test]
-fn packed_output_is_an_eighth_in_crowds_and_not_the_default() {
-    needs_gpu!();
-    let boxes = cubes(1500);
-    let compression = |coding| {
-        let options = GpuOptions { coding, ..GpuOptions::DEFAULT };
-        let mut finder = with(options).with(|it| it.order = Order::Unspecified).finder();
-        [0; 2].map(|_| find(&mut finder, &boxes).1.compression)
-    };
-    assert_eq!(compression(Coding::Auto), [1.0; 2]);
-    let packed = compression(Coding::Packed);
-    assert!(packed.into_iter().all(|ratio| ratio < 0.14), "{packed:?}");
-}
-
-/// A world of one part whose first update has more events than a buffer holds.
-#[test]
-fn more_events_than_a_buffer_holds_are_complete() {
-    needs_gpu!();
-    let boxes = cubes(1500);
-    let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
-    for all_pairs_up_to in [0, 2000] {
-        let gpu = GpuOptions { all_pairs_up_to, ..options };
-        let mut broad_phase = Way { gpu, ..with(options) }.broad_phase();
-        let ids: Vec<u32> = (0..boxes.len() as u32).collect();
-        broad_phase.set_many(&ids, |id| Some((boxes[id as usize], ProxyFilter::ALL))).expect("ids");
-        let added = broad_phase.update().expect("within the limits").added.clone();
-        assert_eq!(broad_phase.report().fallback, None);
-        assert_eq!(difference(&added, &on_cpu(&boxes)), None);
-        broad_phase
-            .set_many(&ids, |id| Some((Aabb::from_center([9.0 * id as f32; 3], [0.5; 3]), ProxyFilter::ALL)))
-            .expect("ids");
-        let removed = broad_phase.update().expect("within the limits").removed.clone();
-        assert_eq!((removed == added, broad_phase.pair_count()), (true, 0));
-        assert_eq!(broad_phase.report().fallback, None);
+    for n in [300, 1024] {
+        let boxes = cubes(n);
+        let mut finder = Way { gpu: GpuOptions::DEFAULT, ..pbig_tests::gpu() }.finder();
+        for call in 0..2 {
+            let (pairs, report) = find(&mut finder, &boxes);
+            assert_eq!(difference(&pairs, &on_cpu(&boxes)), None, "{n}");
+            assert_eq!((report.cells, report.chunks), (0, 1), "{n}");
+            let (down, bytes) = (report.downloaded, 8 * pairs.len() as u64);
+            assert!((bytes..=bytes + 3200).contains(&down), "{n}, call {call}: {down}");
+        }
     }
 }
 

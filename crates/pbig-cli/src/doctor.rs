@@ -2,7 +2,7 @@
 
 use pbig_core::{Aabb, Backend, Config, Finder, Limits, Pair, oracle};
 use pbig_gpu::layout::DeviceBox;
-use pbig_gpu::{Coding, GpuError, GpuFinder, GpuOptions, adapters};
+use pbig_gpu::{GpuError, GpuFinder, GpuOptions, adapters};
 use pbig_harness::prelude::*;
 use pbig_harness::report::simd_found;
 
@@ -149,7 +149,7 @@ fn variants(adapter: &wgpu::Adapter) -> [String; 3] {
         "check, small cells: the device's square root, corrected by integers; large cells: balanced rows"
             .into(),
         format!("times of kernels: {times}"),
-        format!("sets are searched in parts from {} boxes on", most / size_of::<DeviceBox>() as u64),
+        format!("sets of more than {} boxes are the CPU's", most / size_of::<DeviceBox>() as u64),
     ]
 }
 
@@ -182,14 +182,11 @@ fn cpu_finders() -> [(String, Finder); 2] {
         .map(|(name, backend)| (name.into(), Finder::new(Config { backend, ..Config::DEFAULT })))
 }
 
-/// Returns finders on a device in both codings, always with the grid.
-fn gpu_finders(name: &str, gpu: &GpuFinder) -> [(String, Finder); 2] {
-    [(Coding::Plain, "plain"), (Coding::Packed, "packed")].map(|(coding, words)| {
-        let options = GpuOptions { coding, all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
-        let config = Config { backend: Backend::Device, ..Config::DEFAULT };
-        let gpu = gpu.clone().with_options(options);
-        (format!("{name} {words}"), Finder::with_device(config, Box::new(gpu)))
-    })
+/// Returns a finder on a device that always makes a grid.
+fn gpu_finder(gpu: &GpuFinder) -> Finder {
+    let options = GpuOptions { all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
+    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+    Finder::with_device(config, Box::new(gpu.clone().with_options(options)))
 }
 
 /// Returns the pairs of boxes. A device that leaves the work to the CPU is an error.
@@ -204,7 +201,7 @@ fn test_all(
     mut tell: impl FnMut(&Tested) -> Result<(), Failure>,
 ) -> Result<Vec<Tested>, Failure> {
     let opened = candidates.iter().enumerate().filter_map(|(i, one)| Some((i, one.opened.as_ref().ok()?)));
-    let gpus = opened.flat_map(|(i, gpu)| gpu_finders(&format!("gpu {i}"), gpu));
+    let gpus = opened.map(|(i, gpu)| (format!("gpu {i}"), gpu_finder(gpu)));
     let mut tested = Vec::new();
     for (finder, mut it) in cpu_finders().into_iter().chain(gpus) {
         for set in BoxSet::ALL {

@@ -161,12 +161,8 @@ pub struct DeviceReport {
     pub downloaded: u64,
     /// Bytes of buffers on the device, with those for reading back.
     pub device_bytes: u64,
-    /// Output against two ids a pair (PBIG equation 9); 0 without pairs.
-    pub compression: f64,
     /// Chunks of work items.
     pub chunks: u32,
-    /// Parts into which the boxes were split because of the device's limits; 1 if they were not.
-    pub parts: u32,
     /// Waits of the host for the device, one after the other.
     pub waits: u32,
     /// Repetitions of the map or of a chunk that did not fit its buffers.

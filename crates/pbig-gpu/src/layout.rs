@@ -39,16 +39,10 @@ pub const BOX_BITS: u32 = 28;
 pub const AXIS_BITS: u32 = 29;
 /// Bit of [`Params::flags`]: filters are tested.
 pub const FILTERED: u32 = 1;
-/// Bit of [`Params::flags`]: the output is records (docs/PAIR_FORMAT.md), not plain pairs.
-pub const PACKED: u32 = 2;
-/// Bit of [`Params::flags`]: the output of `check_all` is one bit a pair.
-pub const BITS: u32 = 4;
-/// Bit of [`Params::flags`]: plain pairs are sorted, if they fit one buffer.
-pub const SORTED: u32 = 8;
 /// Bit of [`Params::flags`]: redundant tests and overlaps are counted.
-pub const COUNTED: u32 = 16;
+pub const COUNTED: u32 = 2;
 /// Bit of [`Params::flags`]: boxes that live on the device were not measured yet, so there is no plan and no search.
-pub const UNPLANNED: u32 = 32;
+pub const UNPLANNED: u32 = 4;
 /// Words of [`pbig_shaders::Buffer::Summary`] for the size classes: four each.
 pub const CLASS_WORDS: u32 = 1024;
 /// Number of words of [`pbig_shaders::Buffer::Summary`]. Behind the size classes it has six for each box of the sample.
@@ -83,9 +77,9 @@ shared_structs! {
     /// Parameters of all kernels of a call.
     Params {
         boxes: u32, levels: u32, tick_exponent: i32, cells_per_tick: u32,
-        cells: u32, small_cell: u32, columns: u32, flags: u32, split: u32,
+        cells: u32, small_cell: u32, columns: u32, flags: u32,
         entry_capacity: u32, slot_capacity: u32, small_capacity: u32, large_capacity: u32,
-        pair_capacity: u32, most_tests: u32, unused: u32, level: [Level; MAX_LEVELS]
+        most_tests: u32, unused: [u32; 3], level: [Level; MAX_LEVELS]
     }
     /// Range of the work of one dispatch: work items for the check kernels, or grouped pairs.
     Chunk {
@@ -110,10 +104,8 @@ shared_structs! {
         valid: u32, tests: u32, unused: u32, too_many_tests: u32
     }
     /// Counts of a check, even if its output does not fit. Each has a low and a high half. A test is redundant if another cell
-    /// owns the pair. Overlaps include pairs that filters forbid. Without [`COUNTED`] there are only the words, and without
-    /// [`PACKED`] no pairs. `sorted` is 1 if plain pairs are in order.
-    Totals { words: [u32; 2], pairs: [u32; 2], made: [u32; 2], redundant: [u32; 2], overlaps: [u32; 2],
-        sorted: u32, unused: u32 }
+    /// owns the pair. Overlaps include pairs that filters forbid. Without [`COUNTED`] there are only the words.
+    Totals { words: [u32; 2], made: [u32; 2], redundant: [u32; 2], overlaps: [u32; 2] }
     /// The content of the buffer [`crate::DevicePairs::count`].
     ///
     /// Unless [`PairCount::is_complete`], a call has no pairs: repeat it in a later frame, when the counts of this one are known.
@@ -134,13 +126,6 @@ impl PairCount {
     /// Returns true if all pairs are in the buffer.
     pub fn is_complete(&self) -> bool {
         self.status == COMPLETE
-    }
-}
-
-impl Chunk {
-    /// Returns true if there are no work items.
-    pub fn is_empty(&self) -> bool {
-        self.small_items == 0 && self.large_items == 0
     }
 }
 

@@ -29,8 +29,6 @@
 struct Readme;
 
 // Hidden modules are for tests and studies, and may change in any release.
-#[doc(hidden)]
-pub mod decode;
 #[cfg(feature = "wgpu")]
 mod gpu;
 #[doc(hidden)]
@@ -41,8 +39,6 @@ pub mod pbig;
 #[cfg(feature = "wgpu")]
 mod policy;
 
-#[cfg(all(feature = "wgpu", not(target_arch = "wasm32")))]
-pub use gpu::GpuFinders;
 #[doc(hidden)]
 #[cfg(feature = "wgpu")]
 pub use gpu::testing;
@@ -50,4 +46,4 @@ pub use gpu::testing;
 pub use gpu::{DeviceBoxes, DevicePairs, GpuError, GpuFinder, adapter, adapters, describe};
 #[cfg(feature = "wgpu")]
 pub use layout::PairCount;
-pub use options::{Coding, GpuOptions};
+pub use options::GpuOptions;

@@ -2,25 +2,10 @@
 
 use std::time::Duration;
 
-/// The coding of the GPU's output (docs/PAIR_FORMAT.md).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Coding {
-    /// The fastest: plain pairs, and without a grid one bit for each pair of boxes if these are few or the caller wants order.
-    #[default]
-    Auto,
-    /// Two ids a pair.
-    Plain,
-    /// PBIG's three levels of cell, segment and place in the segment (PBIG 5.2). Without a grid: one bit for each pair of
-    /// boxes (Avril 3.4).
-    Packed,
-}
-
 /// The settings of the GPU backend. The defaults suit most programs. A later version may have more settings: end
 /// with `..GpuOptions::DEFAULT`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GpuOptions {
-    /// Coding of the output (PBIG table IV, "data compression").
-    pub coding: Coding,
     /// If true, a piece of a long list comes while threads take the one before (PBIG table IV, "pipelining").
     pub pipelining: bool,
     /// If true, the rows of a large cell get equally many pairs (PBIG table IV, "load balancing").
@@ -28,7 +13,7 @@ pub struct GpuOptions {
     /// Number of small and of large work items of a submission. They have at most 256 and 524,288 tests each. Longer
     /// submissions may exceed the time limit of some systems.
     pub chunk: [u32; 2],
-    /// Largest buffer and binding in bytes, at least 2^20. The device may allow less.
+    /// Largest buffer and binding in bytes, at least 2^20. The device may allow less. A call that needs a larger one is the CPU's.
     pub max_bytes: u64,
     /// Largest size of all buffers of a finder together, in bytes; once more for boxes that live on the device. A call that needs more
     /// is the CPU's: a device without memory fails, and one that shares the system's makes it page.
@@ -61,7 +46,6 @@ pub struct GpuOptions {
 impl GpuOptions {
     /// The defaults.
     pub const DEFAULT: Self = Self {
-        coding: Coding::Auto,
         pipelining: true,
         load_balancing: true,
         chunk: [1 << 18, 1 << 12],

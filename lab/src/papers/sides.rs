@@ -182,13 +182,4 @@ impl SearchCall {
         let checks = &self.report.checks;
         [checks.made, checks.unnecessary, checks.redundant]
     }
-
-    /// Returns the bytes that the kernels have written of output, for the host to decode; none where nothing was found. Those
-    /// that come back are more: with each chunk of work its counters and times, and words that are fetched before it is known how
-    /// many there are; with records also the table for decoding.
-    pub(super) fn written(&self) -> Option<u64> {
-        let gpu = self.report.device.as_ref()?;
-        // The ratio to two ids a pair, of all that the kernels wrote.
-        (self.report.pairs > 0).then(|| (gpu.compression * 8.0 * self.report.pairs as f64).round() as u64)
-    }
 }

@@ -1,20 +1,21 @@
-//! PBIG's table III and figure 10: the pairs, the checks and the output by DoC, "degree of coverage".
+//! PBIG's table III and figure 10: the pairs, the checks and the output by DoC, "degree of coverage". Records are counted, not sent:
+//! they take more bytes than a list but in crowds, and more time to decode than a bus saves.
 //!
 //! Equation 11 is the sum of the volumes of all boxes over that of the space. By it `n` equal cubes, and boxes whose lengths are
 //! independent on each axis, have `4 n DoC` pairs: `n^2 / 2` times the chance `(2 e / L)^3`. The table has an eighth of that.
 
 use super::model::{Model, Space};
 use super::printed::{Coverage, MOST_BOXES, SPACE, TABLE_III, WARP};
-use super::sides::{SearchCall, Setup, Way, effort, once, race};
+use super::sides::{Setup, Way, effort, once, race};
 use crate::UNSORTED;
-use crate::pbig_grid::{CellRule, PbigPlan};
+use crate::pbig_grid::{CellRule, PbigPlan, record_words};
 use pbig_core::Aabb;
+use pbig_gpu::GpuOptions;
 use pbig_gpu::pbig::Summary;
-use pbig_gpu::{Coding, GpuOptions};
 use pbig_harness::prelude::*;
 
 pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
-    Ok(vec![counted(setup)?, on_device(setup)?])
+    Ok(vec![counted(setup)?])
 }
 
 /// Returns the edge of `n` equal cubes in the paper's space that have this DoC by equation 11.
@@ -87,57 +88,26 @@ fn cell(row: &Coverage) -> f64 {
 fn counted(setup: &Setup) -> Result<Table, Failure> {
     let columns = "DoC | pairs printed (N = 10^7) | pairs | off what is expected, standard deviations | \
         checks printed (N = 10^7) | checks in such cells | of them unnecessary | of them redundant | ms printed | \
-        ms, our grid, CPU | ms, PBIG's grid, CPU, one thread";
+        ms, our grid, CPU | ms, PBIG's grid, CPU, one thread | output printed, MB | bytes a pair, MB = 2^20 | records, bytes a pair";
     let mut table = Table::new("PBIG table III and figure 10: density", columns);
     let n = setup.numbers.iter().copied().max().unwrap_or_default();
     let scale = (MOST_BOXES as f64 / n as f64).cbrt();
     for row in &TABLE_III {
         let model = fitting(n, row.doc);
         let boxes = model.draw(n, 1);
-        let pbig = once(Way::Pbig(options_for(&boxes, scale * cell(row))), &boxes)?;
+        let options = options_for(&boxes, scale * cell(row));
+        let words = record_words(&boxes, &options);
+        let pbig = once(Way::Pbig(options), &boxes)?;
         let ours = &race(&[Way::Finder(UNSORTED)], None, boxes, 1.0, effort(n))?[0];
         let (pairs, theirs) = (ours.report.pairs, pbig.report.pairs);
         check(pairs == theirs, || format!("DoC {}: {pairs} pairs, by PBIG's grid {theirs}", row.doc))?;
         let times = cells!["< 1000", ours.median, pbig.ms];
         let counts = cells![row.doc, row.pairs, pairs, model.off(n, pairs), row.checks];
-        table.row(cells![..counts, ..pbig.checks(), ..times]);
+        let printed = row.output * f64::from(1 << 20) / row.pairs as f64;
+        let output = cells![row.output, printed, 4.0 * words as f64 / pairs as f64];
+        table.row(cells![..counts, ..pbig.checks(), ..times, ..output]);
     }
     Ok(table)
-}
-
-/// Counts, times and bytes of the output on a device: as a list and as records in cells as our plan has them, and as records in
-/// cells as the paper's `W` gives them, by rows of segments.
-fn on_device(setup: &Setup) -> Result<Table, Failure> {
-    let columns = "DoC | output printed, MB | bytes a pair, MB = 2^20 | bytes a pair, MB = 10^6 | boxes | pairs, ours | \
-        checks, our W | ms, our W, records | checks, the paper's W | ms, the paper's W, records | bytes written a pair, ours: list | \
-        records | records, the paper's W, rows of segments | bytes fetched a pair, ours: records";
-    let mut table = Table::new("PBIG table III and figure 10: density and bytes of output, GPU", columns);
-    let n = if setup.quick || setup.is_software() { setup.on_device() } else { MOST_BOXES };
-    let with = |coding| GpuOptions { coding, ..GpuOptions::DEFAULT };
-    let rows = GpuOptions { boxes_per_cell: WARP as f32, small_cell: 1, ..with(Coding::Packed) };
-    let ways = [with(Coding::Plain), with(Coding::Packed), rows].map(Way::Gpu);
-    for row in &TABLE_III {
-        let printed = |unit: f64| row.output * unit / row.pairs as f64;
-        let printed = [row.output, printed(f64::from(1 << 20)), printed(1e6)];
-        let calls = setup.run(&ways, &fitting(n, row.doc).draw(n, 1), 1.0)?;
-        table.row(cells![row.doc, ..printed, n, ..of_output(&calls)]);
-    }
-    Ok(table)
-}
-
-fn of_output(calls: &[SearchCall]) -> Vec<Value> {
-    let [list, packed, rows] = calls else { return vec![] };
-    let pairs = list.report.pairs;
-    let a_pair = |bytes: Option<u64>| bytes.filter(|_| pairs > 0).map(|bytes| bytes as f64 / pairs as f64);
-    let [ours, papers] = [packed, rows].map(|call| cells![call.checks()[0], call.ms]);
-    let written = [list, packed, rows].map(|call| a_pair(call.written()));
-    cells![
-        pairs,
-        ..ours,
-        ..papers,
-        ..written,
-        a_pair(packed.report.device.as_ref().map(|gpu| gpu.downloaded))
-    ]
 }
 
 #[cfg(test)]

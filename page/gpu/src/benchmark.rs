@@ -19,7 +19,7 @@ pub struct Benchmark {
     found: DeviceFound,
 }
 
-/// The device's report of a call: milliseconds, bytes, and the bytes of the output against two ids a pair.
+/// The device's report of a call: milliseconds and bytes.
 #[wasm_bindgen]
 #[allow(missing_docs)]
 pub struct Report {
@@ -31,7 +31,6 @@ pub struct Report {
     pub uploaded_bytes: f64,
     pub downloaded_bytes: f64,
     pub device_bytes: f64,
-    pub compression: f64,
 }
 
 /// The time of a kernel.
@@ -129,7 +128,6 @@ impl Benchmark {
             uploaded_bytes: report.uploaded as f64,
             downloaded_bytes: report.downloaded as f64,
             device_bytes: report.device_bytes as f64,
-            compression: report.compression,
         }
     }
 

@@ -1,9 +1,10 @@
 //! Contract: a device that fails or is lost at any moment costs no pair and no event.
 
 use super::{find, on_cpu, set, with_device};
-use pbig_core::{Backend, BroadPhase, Config, Finder, oracle};
-use pbig_gpu::testing::{FAULTS, Fault};
-use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
+use pbig_core::{
+    Backend, BroadPhase, Config, DeviceFailure, DeviceFound, Finder, PairDevice, SearchRequest, oracle,
+};
+use pbig_gpu::{GpuFinder, GpuOptions, adapters};
 use pbig_harness::follower::Follower;
 use pbig_tests::{corpus, difference, needs_gpu};
 use std::time::Duration;
@@ -19,23 +20,53 @@ fn frames(broad_phase: BroadPhase) -> Vec<Option<String>> {
     (0..12).map(frame).collect()
 }
 
+/// A fault, which the test brings about at a wait for the device.
+type Fault = fn(&wgpu::Device);
+
+fn lose(device: &wgpu::Device) {
+    device.destroy();
+}
+
+/// As wgpu does when a device is lost during a wait.
+fn panic(_: &wgpu::Device) {
+    panic!("a fault of the test");
+}
+
+fn refuse(device: &wgpu::Device) {
+    let source = wgpu::ShaderSource::Wgsl("this is no WGSL".into());
+    device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
+}
+
+/// Returns a device that fails at the wait after this number of waits.
+fn failing(fault: Fault, waits: u32) -> GpuFinder {
+    let device = GpuFinder::new().expect("an adapter");
+    let mut left = waits;
+    device.set_hook(move |device| match left.checked_sub(1) {
+        Some(less) => left = less,
+        None => {
+            left = u32::MAX;
+            fault(device);
+        }
+    });
+    device
+}
+
 #[test]
 fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
     needs_gpu!();
     let config = Config { margin: 0.05, backend: Backend::Device, ..Config::DEFAULT };
-    for (fault, words, moments) in FAULTS {
-        let pauses = [Duration::ZERO, Duration::from_secs(3600)];
-        for (&at, pause) in moments.iter().flat_map(|at| pauses.map(|pause| (at, pause))) {
+    let faults: [(Fault, &str); 3] = [(lose, "lost"), (panic, "lost"), (refuse, "refused")];
+    for ((fault, words), waits) in faults.into_iter().flat_map(|fault| [0, 1, 2, 5].map(|at| (fault, at))) {
+        for pause in [Duration::ZERO, Duration::from_secs(3600)] {
             let options = GpuOptions { pause, first_bytes: 0, chunk: [12, 8], ..GpuOptions::DEFAULT };
-            let device = GpuFinder::new().expect("an adapter");
-            device.inject(fault, at);
-            let device = Box::new(device.with_options(options));
+            let device = Box::new(failing(fault, waits).with_options(options));
             let got = frames(BroadPhase::with_device(config, device).expect("a margin"));
             let failed = got.iter().position(|why| why.as_ref().is_some_and(|why| why.contains(words)));
-            let failed = failed.unwrap_or_else(|| panic!("{fault:?} was not reported"));
+            let failed =
+                failed.unwrap_or_else(|| panic!("{words} after {waits} waits was not reported: {got:?}"));
             let after = &got[failed + 1];
             let tried_again = pause == Duration::ZERO;
-            assert_eq!(after.is_none(), tried_again, "{fault:?}: {after:?}");
+            assert_eq!(after.is_none(), tried_again, "{words} after {waits} waits: {after:?}");
         }
     }
 }
@@ -43,40 +74,42 @@ fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
 #[test]
 fn a_device_that_is_lost_at_any_moment_of_a_call_loses_no_pair() {
     needs_gpu!();
-    let options =
-        GpuOptions { chunk: [12, 8], first_bytes: 0, coding: Coding::Packed, ..GpuOptions::DEFAULT };
-    let in_parts = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
-    for (boxes, options) in [(set("mixed", 3000), options), (set("uniform", 70_000), in_parts)] {
-        let wanted = on_cpu(&boxes);
-        let mut lost = 0;
-        for after in 0..10 {
-            let device = GpuFinder::new().expect("an adapter");
-            device.inject(Fault::LoseDevice, after);
-            let mut finder = with_device(options, device);
-            let found = finder.find(&boxes).expect("within the limits");
-            assert_eq!(difference(found, &wanted), None, "lost after {after} submissions");
-            lost += u32::from(finder.report().fallback.is_some());
-        }
-        assert!(lost >= 6, "the device was lost in {lost} of 10 calls only");
+    // A map that is repeated, many chunks, and many pieces.
+    let options = GpuOptions { chunk: [12, 8], first_bytes: 0, ..GpuOptions::DEFAULT };
+    let boxes = set("mixed", 3000);
+    let wanted = on_cpu(&boxes);
+    let mut lost = 0;
+    for after in 0..8 {
+        let mut finder = with_device(options, failing(lose, after));
+        let found = finder.find(&boxes).expect("within the limits");
+        assert_eq!(difference(found, &wanted), None, "lost after {after} waits");
+        lost += u32::from(finder.report().fallback.is_some());
     }
+    assert!((4..8).contains(&lost), "the device was lost in {lost} of 8 calls");
 }
 
-#[test]
-fn several_devices_of_which_one_is_lost_lose_no_pair() {
-    needs_gpu!();
-    let adapter = adapters().into_iter().next().expect("an adapter");
-    let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
-    let gpus = GpuFinders::on_all(&[adapter.clone(), adapter]).expect("devices").with_options(options);
-    gpus.inject(Fault::LoseDevice, 1);
-    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
-    let mut finder = Finder::with_device(config, Box::new(gpus));
-    let boxes = set("mixed", 5000);
-    let parts = [(); 4].map(|()| {
-        assert_eq!(difference(finder.find(&boxes).expect("few pairs"), &on_cpu(&boxes)), None);
-        let report = finder.report();
-        report.fallback.is_none().then(|| report.device.as_ref().map_or(0, |gpu| gpu.parts))
-    });
-    assert_eq!(parts.iter().flatten().collect::<Vec<_>>(), [&3; 3], "one call is the CPU's");
+/// An app's device whose first call has no time.
+#[derive(Clone, Debug)]
+struct Busy(GpuFinder, bool);
+
+impl PairDevice for Busy {
+    fn find_all(&mut self, request: &SearchRequest<'_>, to: &mut DeviceFound) -> Result<(), DeviceFailure> {
+        let patience = if std::mem::take(&mut self.1) { Duration::ZERO } else { Duration::from_secs(30) };
+        let options = GpuOptions { pause: Duration::ZERO, patience, ..GpuOptions::DEFAULT };
+        let mut gpu = std::mem::take(&mut self.0).with_options(options);
+        let result = gpu.find_all(request, to);
+        self.0 = gpu;
+        result
+    }
+    fn name(&self) -> Option<&str> {
+        self.0.name()
+    }
+    fn is_software(&self) -> bool {
+        false
+    }
+    fn clone_box(&self) -> Box<dyn PairDevice> {
+        Box::new(self.clone())
+    }
 }
 
 /// Contract: a device of the app that was busy for too long is lost for that call only.
@@ -87,13 +120,13 @@ fn an_apps_device_that_was_busy_is_used_again_when_it_is_idle() {
     let device = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()));
     let (device, queue) = device.expect("a device with WebGPU's default limits");
     let finder = GpuFinder::from_device(device, queue).expect("default limits are enough");
-    finder.inject(Fault::Timeout, 1);
-    let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
-    let mut finder = with_device(options, finder);
-    let boxes = set("pile", 2000);
+    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+    let mut finder = Finder::with_device(config, Box::new(Busy(finder, true)));
+    let boxes = set("pile", 20_000);
+    let wanted = on_cpu(&boxes);
     let mut whys = Vec::new();
     while whys.len() < 100 && whys.last() != Some(&None) {
-        assert_eq!(finder.find(&boxes).expect("few pairs"), on_cpu(&boxes));
+        assert_eq!(difference(finder.find(&boxes).expect("few pairs"), &wanted), None);
         whys.push(finder.report().fallback.clone());
     }
     assert!(whys[0].as_ref().is_some_and(|why| why.contains("did not answer")), "{:?}", whys[0]);

@@ -15,8 +15,7 @@ impl TestedPairs {
     /// Tests two entries of a cell.
     pub(super) fn test_entries(&mut self, s: &State, a: u32, b: u32) {
         let (i, j) = (box_of(a), box_of(b));
-        let split = s.params.split;
-        if !may_own(a | b) || (split > 0 && (i < split) == (j < split)) {
+        if !may_own(a | b) {
             self.made += 1;
             self.redundant += 1;
         } else {
@@ -38,15 +37,12 @@ impl TestedPairs {
 
     /// Writes the result into the state, unless the limit of pairs was passed before.
     pub(super) fn leave(self, s: &mut State) {
-        if s.has(PACKED | BITS) && wide(s.totals.pairs) > wide(s.chunk.pairs_left) {
+        if wide(s.totals.words) / 2 > wide(s.chunk.pairs_left) {
             return;
         }
-        s.out = encoded(s, &self.pairs);
-        let words = if s.has(BITS) { 0 } else { s.out.len() as u64 };
-        let counted = if s.has(PACKED | BITS) { self.pairs.len() as u64 } else { 0 };
+        s.out = self.pairs.iter().flat_map(|pair| [pair.a, pair.b]).collect();
         let add = |total: &mut [u32; 2], more: u64| *total = halves(wide(*total) + more);
-        add(&mut s.totals.words, words);
-        add(&mut s.totals.pairs, counted);
+        add(&mut s.totals.words, s.out.len() as u64);
         add(&mut s.totals.made, self.made);
         add(&mut s.totals.redundant, self.redundant);
         add(&mut s.totals.overlaps, self.overlaps);

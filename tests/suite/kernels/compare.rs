@@ -43,66 +43,26 @@ pub(super) fn compare_entries(before: &State, found: &State, wanted: &State) -> 
     same("cells", &found.cells, &wanted.cells).or_else(|| (0..before.cells.len()).find_map(cell_fault))
 }
 
-/// Returns pairs as words, in the simplest way that the format allows.
-pub(super) fn encoded(s: &State, pairs: &[Pair]) -> Vec<u32> {
-    let n = u64::from(s.params.boxes);
-    if s.has(BITS) {
-        let mut words = vec![0; pair_count(n).div_ceil(32).next_multiple_of(8) as usize];
-        for pair in pairs {
-            let k = index_of(pair.a.into(), pair.b.into(), n) as usize;
-            words[k / 32] |= 1 << (k % 32);
-        }
-        return words;
-    }
-    let mark = (s.has(PACKED) && !pairs.is_empty()).then_some(PLAIN | pairs.len() as u32);
-    mark.into_iter().chain(pairs.iter().flat_map(|pair| [pair.a, pair.b])).collect()
-}
-
 /// Returns the pairs in `out`, sorted.
-pub(super) fn decoded(s: &State) -> Result<Vec<Pair>, String> {
-    let n = s.params.boxes;
-    let counted = if s.has(BITS) { pair_count(n.into()).div_ceil(32) } else { wide(s.totals.words) };
-    let words = s.out.get(..counted as usize).ok_or(format!("{counted} words in {}", s.out.len()))?;
-    let (mut pairs, ids) = (PairList::default(), BoxIds::First(n));
-    let result = if s.has(BITS) {
-        decode::bits(words, ids, &mut pairs)
-    } else if s.has(PACKED) {
-        decode::records(words, &s.entries, ids, &mut pairs)
-    } else {
-        decode::plain(words, ids, false, &mut pairs)
-    };
-    result.map(|()| sorted(&pairs)).map_err(|error| error.to_string())
+pub(super) fn pairs_of(s: &State) -> Result<Vec<Pair>, String> {
+    let words = s.out.get(..wide(s.totals.words) as usize).ok_or("words beyond the end")?;
+    let pair = |words: &[u32; 2]| (words[0] < words[1]).then(|| Pair::new(words[0], words[1]));
+    let pairs: Option<Vec<Pair>> = words.as_chunks().0.iter().map(pair).collect();
+    pairs.map(|pairs| sorted(&pairs)).ok_or("a pair that is not a < b".to_owned())
 }
 
 pub(super) fn compare_checks(_: &State, found: &State, wanted: &State) -> Option<String> {
-    let pairs = match decoded(found) {
+    let pairs = match pairs_of(found) {
         Ok(pairs) => pairs,
         Err(error) => return Some(error),
     };
-    difference(&pairs, &decoded(wanted).expect("a twin writes what can be read"))
+    difference(&pairs, &pairs_of(wanted).expect("a twin writes pairs"))
         .or_else(|| same("counts", &counts(found), &counts(wanted)))
-        .or_else(|| words_fault(found, wanted))
 }
 
-/// Returns the numbers of pairs, tests, redundant tests and overlaps.
+/// Returns the numbers of words, tests, redundant tests and overlaps.
 pub(super) fn counts(s: &State) -> [u64; 4] {
-    [s.totals.pairs, s.totals.made, s.totals.redundant, s.totals.overlaps].map(wide)
-}
-
-/// Compares the numbers of words. Records take at most as many as marked plain pairs of one workgroup each.
-pub(super) fn words_fault(found: &State, wanted: &State) -> Option<String> {
-    let (words, plain) = (wide(found.totals.words), wide(wanted.totals.words));
-    let right = if found.has(PACKED) { words <= 3 * hits(wanted) } else { words == plain };
-    (!right).then(|| format!("{words} words, {plain} if plain"))
-}
-
-/// Returns the number of pairs that a check has found.
-pub(super) fn hits(s: &State) -> u64 {
-    if s.has(PACKED | BITS) {
-        wide(s.totals.pairs).saturating_sub(wide(NEARLY))
-    } else {
-        wide(s.totals.words) / 2
-    }
+    [s.totals.words, s.totals.made, s.totals.redundant, s.totals.overlaps].map(wide)
 }
 
 pub(super) fn compare_indices(_: &State, found: &State, wanted: &State) -> Option<String> {

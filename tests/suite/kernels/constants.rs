@@ -1,7 +1,7 @@
 //! Contract: constants and bindings are the same in Rust and in WGSL, and integers keep the order of floats. Kernels and twins
 //! share each field of each struct.
 
-use super::layout::{COMPLETE, NOT_PLANNED, PLAN_REFUSED, SORTED, TOO_LARGE};
+use super::layout::{COMPLETE, NOT_PLANNED, PLAN_REFUSED, TOO_LARGE};
 use super::*;
 
 fn module_of(kernel: &Kernel) -> naga::Module {
@@ -30,10 +30,10 @@ macro_rules! named {
 fn constants_are_those_of_the_kernels() {
     let everywhere = named! {
         LANES, GROUPS_PER_ROW, MAX_LEVELS, NO_LEVEL, SPAN_BITS, BOX_BITS, AXIS_BITS,
-        FILTERED, PACKED, BITS, SORTED, COUNTED, UNPLANNED, COMPLETE, NOT_PLANNED, TOO_LARGE, PLAN_REFUSED
+        FILTERED, COUNTED, UNPLANNED, COMPLETE, NOT_PLANNED, TOO_LARGE, PLAN_REFUSED
     };
     let somewhere = named! {
-        CELLS_PER_BLOCK, CELLS_PER_LANE, PLAIN, COUNTS_PER_BLOCK, SHORT_ROW, WINDOW, PIECE, PIECES,
+        CELLS_PER_BLOCK, CELLS_PER_LANE, COUNTS_PER_BLOCK, SHORT_ROW, WINDOW, PIECE, PIECES,
         FIRST_PIECE, CLASS_WORDS, SUMMARY_WORDS
     };
     let most_span = format!("const MAX_SPAN = {MAX_SPAN};");

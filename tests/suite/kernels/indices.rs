@@ -4,7 +4,7 @@ use super::*;
 
 /// Returns the state for `count` indices from `first` on.
 pub(super) fn indices(n: u32, first: u32, count: u32) -> State {
-    let params = Params { boxes: n, split: first, cells: count, ..Params::default() };
+    let params = Params { boxes: n, levels: first, cells: count, ..Params::default() };
     State { params, ..State::default() }
 }
 
@@ -12,7 +12,7 @@ pub(super) fn indices(n: u32, first: u32, count: u32) -> State {
 pub(super) fn index_pairs(s: &mut State) {
     s.out.clear();
     for i in 0..s.params.cells {
-        let (a, b) = pair_of((s.params.split + i).into(), s.params.boxes.into());
+        let (a, b) = pair_of((s.params.levels + i).into(), s.params.boxes.into());
         s.out.extend([a as u32, a as u32, b as u32]);
     }
 }

@@ -14,7 +14,7 @@ fn counted(kernel: &str, edits: &[[&str; 2]], before: &State) -> [u64; 2] {
 /// Returns the lane steps of `check_large`, idle ones included, and the tests: all lanes take as long as the slowest one.
 /// `planted` is an edit that may make it slower.
 fn steps(before: &State, planted: [&str; 2]) -> [u64; 2] {
-    let place = "let hits = atomicExchange(&tally[HITS], 0u);";
+    let place = "let words = 2u * atomicExchange(&tally[HITS], 0u);";
     let edits = [
         ["var<workgroup> skip: u32;", "var<workgroup> skip: u32; var<workgroup> longest: atomic<u32>;"],
         ["atomicStore(&marks, 0u);", "atomicStore(&marks, 0u); atomicStore(&longest, 0u);"],

@@ -18,24 +18,22 @@ mod single;
 mod sort;
 mod state;
 mod twins;
-mod words;
 
 use bytemuck::{bytes_of_mut, cast_slice_mut};
 use checks::*;
 use compare::*;
 use device::*;
 use indices::*;
-use pbig_core::{Aabb, BoxIds, Pair, PairList, ProxyFilter, oracle};
-use pbig_gpu::decode::{self, PLAIN};
+use pbig_core::{Aabb, Pair, ProxyFilter, oracle};
 use pbig_gpu::layout::{
-    self, AXIS_BITS, BITS, BOX_BITS, CELLS_PER_BLOCK, CLASS_WORDS, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk,
+    self, AXIS_BITS, BOX_BITS, CELLS_PER_BLOCK, CLASS_WORDS, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk,
     Counters, DeviceBox, FILTERED, FIRST_PIECE, GROUPS_PER_ROW, LANES, LargeItem, Level, Located, MAX_SPAN,
-    NO_LEVEL, PACKED, PIECE, PIECES, PairCount, Params, SHORT_ROW, SPAN_BITS, SUMMARY_WORDS, Slot, SmallItem,
-    Totals, UNPLANNED, WINDOW, halves, wide,
+    NO_LEVEL, PIECE, PIECES, PairCount, Params, SHORT_ROW, SPAN_BITS, SUMMARY_WORDS, Slot, SmallItem, Totals,
+    UNPLANNED, WINDOW, halves, wide,
 };
 use pbig_gpu::testing::plan_params;
 use pbig_gpu::{GpuFinder, GpuOptions};
-use pbig_harness::pair_index::{index_of, pair_count, pair_of};
+use pbig_harness::pair_index::{pair_count, pair_of};
 use pbig_shaders::{self as shaders, Buffer, KERNELS, Kernel, Stage};
 use pbig_tests::{corpus, difference, needs_gpu, without_gpu};
 use plans::validate;
@@ -67,9 +65,8 @@ fn the_twins_together_find_the_pairs_of_the_oracle() {
         let wanted =
             [(0, oracle::pairs(&case.boxes)), (FILTERED, oracle::pairs_filtered(&case.boxes, filters))];
         for (flags, wanted) in wanted {
-            let state = before.clone().with(flags, 0);
-            let pairs =
-                |kernel| decoded(&after_twin(twin(kernel), &state)).expect("a twin writes plain pairs");
+            let state = before.clone().with(flags);
+            let pairs = |kernel| pairs_of(&after_twin(twin(kernel), &state)).expect("a twin writes pairs");
             let both = sorted(&[pairs("check_small"), pairs("check_large")].concat());
             assert_eq!(difference(&both, &wanted), None, "{}, flags {flags}", case.name);
             assert_eq!(difference(&pairs("check_all"), &wanted), None, "{}, flags {flags}", case.name);
@@ -192,7 +189,7 @@ fn arrange_dispatches_nothing_without_capacity() {
 #[test]
 fn conclude_says_what_did_not_fit() {
     let with = |words: u64, capacity: u32, flags: u32| {
-        let mut before = State::before("conclude", &pile()).with(flags, 0);
+        let mut before = State::before("conclude", &pile()).with(flags);
         (before.totals.words, before.chunk.word_capacity) = (halves(words), capacity);
         before.params.most_tests = before.counters.tests;
         // A list of no words would get the capacity for the twin's.
@@ -220,10 +217,10 @@ fn conclude_says_what_did_not_fit() {
 #[test]
 fn checks_agree_with_their_twins() {
     let usual = GpuOptions::DEFAULT;
-    check_agrees("check_small", &usual, &[0, PACKED], usize::MAX);
-    check_agrees("check_large", &usual, &[0, PACKED], usize::MAX);
-    check_agrees("check_large", &GpuOptions { load_balancing: false, ..usual }, &[0, PACKED], usize::MAX);
-    check_agrees("check_all", &usual, &[0, PACKED, BITS], 2000);
+    check_agrees("check_small", &usual, usize::MAX);
+    check_agrees("check_large", &usual, usize::MAX);
+    check_agrees("check_large", &GpuOptions { load_balancing: false, ..usual }, usize::MAX);
+    check_agrees("check_all", &usual, 2000);
 }
 
 /// Numbers of pairs around the size of a workgroup, and none.
@@ -232,31 +229,26 @@ fn check_all_agrees_with_its_twin_on_few_boxes() {
     for n in [1, 2, 3, 8, 9, 23, 24, 33] {
         let case =
             Case { name: "few", boxes: vec![Aabb::new([0.0; 3], [1.0; 3]); n], small_cell: 32, columns: 8 };
-        for flags in [0, PACKED, BITS] {
-            let before = State::new(&case).with(flags, 0);
-            let fault = fault(twin("check_all"), &GpuOptions::DEFAULT, &before);
-            assert_eq!(fault, None, "{n} boxes, flags {flags}");
-        }
+        let fault = fault(twin("check_all"), &GpuOptions::DEFAULT, &State::new(&case));
+        assert_eq!(fault, None, "{n} boxes");
     }
 }
 
 #[test]
 fn a_chunk_is_its_items_and_no_others() {
     for (kernel, case) in [("check_small", pile()), ("check_large", crowd())] {
-        for flags in [0, PACKED] {
-            let mut before = State::before(kernel, &case).with(flags, 0);
-            let Counters { small_items: small, large_items: large, .. } = before.counters;
-            for (from, part) in [(0, 3), (1, 3), (2, 1)] {
-                before.chunk = Chunk {
-                    first_small: from * small / 3,
-                    small_items: small / part,
-                    first_large: from * large / 3,
-                    large_items: large / part,
-                    ..before.chunk
-                };
-                let fault = fault(twin(kernel), &GpuOptions::DEFAULT, &before);
-                assert_eq!(fault, None, "{kernel}, flags {flags}, {:?}", before.chunk);
-            }
+        let mut before = State::before(kernel, &case);
+        let Counters { small_items: small, large_items: large, .. } = before.counters;
+        for (from, part) in [(0, 3), (1, 3), (2, 1)] {
+            before.chunk = Chunk {
+                first_small: from * small / 3,
+                small_items: small / part,
+                first_large: from * large / 3,
+                large_items: large / part,
+                ..before.chunk
+            };
+            let fault = fault(twin(kernel), &GpuOptions::DEFAULT, &before);
+            assert_eq!(fault, None, "{kernel}, {:?}", before.chunk);
         }
     }
 }

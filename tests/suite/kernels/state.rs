@@ -20,7 +20,7 @@ pub(super) struct State {
     pub(super) small_items: Vec<SmallItem>,
     pub(super) large_items: Vec<LargeItem>,
     pub(super) entries: Vec<u32>,
-    pub(super) dispatches: [u32; 9],
+    pub(super) dispatches: [u32; 6],
     pub(super) totals: Totals,
     pub(super) out: Vec<u32>,
     pub(super) rows: Vec<u32>,
@@ -103,14 +103,7 @@ impl State {
             located: vec![Located::default(); n],
             cells: vec![Cell::default(); params.cells as usize],
             sums: vec![0; (2 * params.cells).div_ceil(COUNTS_PER_BLOCK) as usize],
-            totals: Totals {
-                words: [0; 2],
-                pairs: NEARLY,
-                made: NEARLY,
-                redundant: NEARLY,
-                overlaps: NEARLY,
-                ..Totals::default()
-            },
+            totals: Totals { words: [0; 2], made: NEARLY, redundant: NEARLY, overlaps: NEARLY },
             ..Self::default()
         };
         state.set_exact_capacities();
@@ -149,8 +142,8 @@ impl State {
         state
     }
 
-    pub(super) fn with(mut self, flags: u32, split: u32) -> Self {
-        (self.params.flags, self.params.split) = (flags | COUNTED, split);
+    pub(super) fn with(mut self, flags: u32) -> Self {
+        self.params.flags = flags | COUNTED;
         self
     }
 

@@ -13,7 +13,6 @@ mod soak_worlds;
 use crate::finder::check;
 use crate::follower::Follower;
 use pbig_core::{Aabb, Backend, Config, ProxyFilter};
-use pbig_gpu::Coding;
 use pbig_tests::{Way, engines, gpu, may_run};
 
 /// Tests a set through the finder, and through updates in which its boxes change places.
@@ -26,7 +25,7 @@ fn everywhere(name: &str, boxes: &[Aabb]) {
 fn ways_to_update() -> Vec<(&'static str, Way)> {
     let mut ways = vec![("auto", Way::from(Config::DEFAULT))];
     ways.extend(engines());
-    ways.push(("gpu grid", gpu(Coding::Plain)));
+    ways.push(("gpu grid", gpu()));
     ways.into_iter().filter(|(_, way)| may_run(way)).collect()
 }
 

@@ -4,7 +4,7 @@
 use super::memory;
 use crate::follower::Follower;
 use pbig_core::{Aabb, Backend, BroadPhase, Config, Engine, ProxyFilter, Report};
-use pbig_gpu::{Coding, GpuFinder};
+use pbig_gpu::GpuFinder;
 use pbig_tests::{Way, gpu, needs_gpu, on_threads, set, shifted};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -192,7 +192,7 @@ fn soak_on_threads() {
 #[test]
 fn soak_on_a_gpu() {
     needs_gpu!();
-    let way = gpu(Coding::Auto).with(|it| it.margin = 0.05);
+    let way = gpu().with(|it| it.margin = 0.05);
     // A device of its own: threads that share one free each other's memory.
     let broad_phase = || {
         let device = GpuFinder::new().expect("an adapter").with_options(way.gpu);

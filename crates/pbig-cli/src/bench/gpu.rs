@@ -34,7 +34,7 @@ fn boxes(set: &str, n: usize) -> Vec<Aabb> {
 /// turns; `steady_ms` is of calls of the device alone, one right after the other, as idle devices lower their clocks. `wait_ms`
 /// leaves out the host's part. It and the columns after it are of the last of these calls, the times of kernels of calls after them.
 fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 2], Failure> {
-    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | steady_ms | wait_ms | upload_ms | plan_ms | record_ms | decode_ms | uploaded_bytes | downloaded_bytes | device_bytes | compression";
+    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | steady_ms | wait_ms | upload_ms | plan_ms | record_ms | decode_ms | uploaded_bytes | downloaded_bytes | device_bytes";
     let mut table = Table::new("searches", columns);
     let mut kernels = Table::new("kernels", "set | boxes | kernel | kernel_ms");
     let sets = ["uniform", "gaussian", "mixed"];
@@ -48,7 +48,7 @@ fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 2], Failure> {
         };
         let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, steady];
         let parts = [report.wait, report.upload, report.plan, report.record, report.decode];
-        let bytes = cells![report.uploaded, report.downloaded, report.device_bytes, report.compression];
+        let bytes = cells![report.uploaded, report.downloaded, report.device_bytes];
         table.row(cells![..times, ..parts.map(milliseconds), ..bytes]);
         for (name, time) in &report.kernels {
             kernels.row(cells![set, n, *name, milliseconds(*time)]);

@@ -1,7 +1,6 @@
 //! Errors of a device. None of them reaches a caller of [`pbig_core::Finder`]: the call finishes on the CPU, and the report
 //! says why.
 
-use crate::decode::DecodeError;
 use pbig_core::DeviceFailure;
 
 /// Reason why a device could not do the work.
@@ -38,7 +37,7 @@ pub enum GpuError {
     /// wgpu refused a shader or a command.
     #[error("refused by wgpu: {0}")]
     Refused(String),
-    /// A buffer would be larger than a limit allows, and the work cannot be split further.
+    /// A buffer would be larger than a limit allows.
     #[error("{what}: {bytes} bytes are needed, but the device or GpuOptions::max_bytes allows {limit}")]
     TooLarge {
         /// The buffer's name.
@@ -63,9 +62,9 @@ pub enum GpuError {
     /// An argument is wrong, for this reason.
     #[error("{0}")]
     Argument(String),
-    /// The device returned words that break the pair format.
-    #[error(transparent)]
-    Decode(#[from] DecodeError),
+    /// The device returned pairs that cannot be, for this reason.
+    #[error("the device returned wrong pairs: {0}")]
+    BadPairs(String),
     /// The device failed a short while ago, and calls wait before they try it again ([`crate::GpuOptions::pause`]).
     #[error("the device failed {0}")]
     Paused(String),
@@ -84,7 +83,13 @@ pub(super) enum Failure {
 
 impl<E: Into<GpuError>> From<E> for Failure {
     fn from(error: E) -> Self {
-        Self::Device(error.into())
+        match error.into() {
+            // The device works: it is the set that is too large.
+            large @ (GpuError::TooLarge { .. } | GpuError::OverBudget { .. }) => {
+                Self::Declined(large.to_string())
+            }
+            error => Self::Device(error),
+        }
     }
 }
 

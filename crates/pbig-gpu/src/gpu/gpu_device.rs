@@ -4,23 +4,12 @@ use super::{GpuError, adapter, wait};
 use crate::GpuOptions;
 use pbig_shaders::{Buffer, KERNELS, Kernel, SCAN_BLOCKS, SCAN_SUMS};
 use std::collections::HashMap;
+use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A fault that a test injects at a later submission.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// The device is destroyed before the submission.
-    LoseDevice,
-    /// The device has no memory for the next buffer.
-    OutOfMemory,
-    /// The kernels do not compile.
-    RefuseShader,
-    /// The device does not answer in time.
-    Timeout,
-    /// wgpu panics, as it does when a device is lost during a wait.
-    Panic,
-}
+/// Work of a test before each wait: it may destroy the device, or panic as wgpu does.
+pub(super) type Hook = Box<dyn FnMut(&wgpu::Device) + Send>;
 
 /// The choices that are fixed when a pipeline is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -53,7 +42,6 @@ impl Variant {
 }
 
 /// A device with its pipelines, shared by finders.
-#[derive(Debug)]
 pub(super) struct GpuDevice {
     pub(super) handle: wgpu::Device,
     pub(super) queue: wgpu::Queue,
@@ -66,8 +54,14 @@ pub(super) struct GpuDevice {
     /// A call of a page is in progress.
     #[cfg(target_arch = "wasm32")]
     pub(super) is_in_call: AtomicBool,
-    /// An injected fault, and the number of submissions until it happens.
-    fault: Mutex<Option<(Fault, u32)>>,
+    pub(super) hook: Mutex<Hook>,
+}
+
+/// A hook has no description.
+impl fmt::Debug for GpuDevice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
 }
 
 impl GpuDevice {
@@ -85,7 +79,7 @@ impl GpuDevice {
             is_lost: AtomicBool::new(false),
             #[cfg(target_arch = "wasm32")]
             is_in_call: AtomicBool::new(false),
-            fault: Mutex::default(),
+            hook: Mutex::new(Box::new(|_| ())),
         })
     }
 
@@ -118,15 +112,6 @@ impl GpuDevice {
 
     pub(super) fn is_lost(&self) -> bool {
         self.is_lost.load(Ordering::Relaxed)
-    }
-
-    pub(super) fn inject(&self, fault: Fault, submissions: u32) {
-        *lock(&self.fault) = Some((fault, submissions));
-    }
-
-    /// Returns true, once, if the given fault is due.
-    pub(super) fn is_due(&self, fault: Fault) -> bool {
-        lock(&self.fault).take_if(|armed| *armed == (fault, 0)).is_some()
     }
 
     pub(super) fn max_buffer_bytes(&self, options: &GpuOptions) -> u64 {
@@ -181,11 +166,7 @@ impl GpuDevice {
         if let Some(pipeline) = pipelines.get(&(kernel.name, variant)) {
             return pipeline.clone();
         }
-        let mut source = kernel.source();
-        if self.is_due(Fault::RefuseShader) {
-            source.push_str("this is no WGSL");
-        }
-        let pipeline = self.compile(kernel, &source, variant);
+        let pipeline = self.compile(kernel, &kernel.source(), variant);
         pipelines.insert((kernel.name, variant), pipeline.clone());
         pipeline
     }
@@ -221,9 +202,6 @@ impl GpuDevice {
         usage: wgpu::BufferUsages,
         mapped_at_creation: bool,
     ) -> Result<wgpu::Buffer, GpuError> {
-        if self.is_due(Fault::OutOfMemory) {
-            return Err(GpuError::OutOfMemory);
-        }
         self.buffers_made.fetch_add(1, Ordering::Relaxed);
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation };
         Ok(self.handle.create_buffer(&descriptor))
@@ -234,12 +212,6 @@ impl GpuDevice {
     }
 
     pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
-        if self.is_due(Fault::LoseDevice) {
-            self.handle.destroy();
-        }
-        if let Some((_, left)) = &mut *lock(&self.fault) {
-            *left = left.saturating_sub(1);
-        }
         self.queue.submit([encoder.finish()])
     }
 

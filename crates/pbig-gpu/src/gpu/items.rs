@@ -1,4 +1,4 @@
-//! Ranges of work items: what is left, and how it is cut into chunks.
+//! Ranges of work items: those after the first chunk, cut into chunks.
 
 use crate::layout::{Chunk, Counters};
 
@@ -8,14 +8,6 @@ pub(super) fn rest(all: &Counters, done: &Chunk) -> Chunk {
         [all.small_items.min(done.small_items), all.large_items.min(done.large_items)];
     let (small_items, large_items) = (all.small_items - first_small, all.large_items - first_large);
     Chunk { first_small, small_items, first_large, large_items, ..Chunk::default() }
-}
-
-/// Returns the counts of a map with a sixteenth more work items: when boxes move, the next map has a few more or less. An item
-/// that is not there costs a workgroup that ends at once, one that was not expected a submission and a wait.
-pub(super) fn with_slack(counters: &Counters) -> Counters {
-    let more = |items: u32| items.saturating_add(items / 16);
-    let (small_items, large_items) = (more(counters.small_items), more(counters.large_items));
-    Counters { small_items, large_items, ..*counters }
 }
 
 /// Cuts a range of work items into chunks.

@@ -1,7 +1,7 @@
 //! The plan of earlier calls. A plan decides only the time of a search, so it is kept until the boxes have outgrown it: then the
 //! host looks at all of them once more. In between, a call costs it nothing for planning.
 
-use super::GpuPlan;
+use super::{GpuError, GpuPlan};
 use crate::GpuOptions;
 use crate::layout::{Counters, LANES};
 use crate::pbig::Summary;
@@ -68,6 +68,17 @@ impl KeptPlan {
         let most = most_tests(boxes, pairs, boxes_per_cell) / u64::from(LANES);
         // The device takes the largest number for no limit.
         most.min(u64::from(u32::MAX) - 1) as u32
+    }
+
+    /// Returns an error if 32 bits might not count the entries of this number of boxes: up to 4 x 4 x 4 in each level but the last.
+    pub(super) fn check_entries(&self, boxes: u32) -> Result<(), GpuError> {
+        let entries = u64::from(boxes) * (64 * (self.plan.levels.len() as u64 - 1) + 1);
+        let limit = u64::from(u32::MAX);
+        if entries > limit {
+            Err(GpuError::TooLarge { what: "entries", bytes: entries, limit })
+        } else {
+            Ok(())
+        }
     }
 
     /// Notes a call. Returns true if the work for a box has doubled or halved since the first one.

@@ -3,29 +3,23 @@
 //! The kernels are in the crate `pbig-shaders`. The module `layout` has the structs that their buffers hold.
 
 mod adapter;
-mod attempts;
-mod chunk;
-mod coding;
 mod declined;
 mod error;
+mod forecast;
 mod gpu_device;
 mod gpu_plan;
 mod items;
-mod job;
 mod kept_plan;
 mod levels;
 mod passes;
 mod readback;
 mod reports;
 mod resident;
-mod search;
 mod session;
-#[cfg(not(target_arch = "wasm32"))]
-mod several;
-mod sink;
 mod storage;
 pub mod testing;
 mod ticks;
+mod timer;
 #[cfg_attr(target_arch = "wasm32", path = "wait_web.rs")]
 mod wait;
 
@@ -34,17 +28,13 @@ use error::Failure;
 pub use error::GpuError;
 use gpu_plan::GpuPlan;
 pub use resident::{DeviceBoxes, DevicePairs};
-#[cfg(not(target_arch = "wasm32"))]
-pub use several::GpuFinders;
 
 use crate::GpuOptions;
 use declined::Declined;
 use gpu_device::GpuDevice;
-use job::Job;
 use pbig_core::internal::Clock;
 use pbig_core::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 use resident::Resident;
-use search::search;
 use session::Session;
 use std::sync::Arc;
 use std::time::Duration;
@@ -185,7 +175,7 @@ impl GpuFinder {
         request: &SearchRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
-        self.run(&Job::all(request), found).await.map_err(Failure::for_core)
+        self.run(request, found).await.map_err(Failure::for_core)
     }
 
     /// Records a search of boxes that live on the device, and whose pairs stay there. Submits nothing, waits for nothing, and, where
@@ -250,13 +240,13 @@ impl GpuFinder {
         }
     }
 
-    async fn run(&mut self, job: &Job<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
+    async fn run(&mut self, request: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
         self.check_pause()?;
-        let boxes = job.boxes.len();
+        let boxes = request.boxes.len();
         if let Some(why) = self.declined.unseen(boxes) {
             return Err(Failure::Declined(why));
         }
-        let result = self.try_run(job, found).await;
+        let result = self.try_run(request, found).await;
         match &result {
             Err(Failure::Declined(why)) => self.declined.note(boxes, why),
             Ok(()) => self.declined = Declined::default(),
@@ -271,22 +261,16 @@ impl GpuFinder {
         result
     }
 
-    /// Runs a search in a session that is kept unless the device failed: its state may be wrong then, or if the call was given up.
-    async fn try_run(&mut self, job: &Job<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
+    /// Runs a search in a session that is kept unless the device failed or declined: its state may be wrong then, or too large.
+    async fn try_run(&mut self, request: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
         let mut session = self.take_session().await?;
         let (device, pairs) = (session.device.clone(), std::mem::take(&mut found.pairs));
-        let result = device.watch(async || search(&mut session, job, pairs).await).await;
-        let result = result.map(|answer| {
-            *found = answer;
-            session.end_call();
-        });
-        match result {
-            Err(Failure::TooManyPairs | Failure::Declined(_)) => session.forget_call(),
-            Ok(()) | Err(Failure::Device(GpuError::Busy)) => {}
-            Err(Failure::Device(_)) => return result,
+        let result = device.watch(async || session.search(request, pairs).await).await;
+        if matches!(result, Ok(_) | Err(Failure::TooManyPairs | Failure::Device(GpuError::Busy))) {
+            self.session = Some(session);
         }
-        self.session = Some(session);
-        result
+        *found = result?;
+        Ok(())
     }
 
     /// Returns an error while calls stay on the CPU because the device failed a short while ago.
@@ -337,7 +321,7 @@ impl PairDevice for GpuFinder {
         request: &SearchRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
-        wait::block_on(self.run(&Job::all(request), found)).map_err(Failure::for_core)
+        wait::block_on(self.run(request, found)).map_err(Failure::for_core)
     }
 
     fn name(&self) -> Option<&str> {

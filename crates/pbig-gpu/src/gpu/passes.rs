@@ -1,17 +1,15 @@
-//! The kernels and buffers of a submission, as tables.
+//! The kernels and buffers of a search, as tables.
 
 use super::GpuError;
 use super::gpu_device::Variant;
 use super::storage::Storage;
+use super::timer::Timer;
 use crate::layout::{
     self, CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Chunk, Counters, GROUPS_PER_ROW, LANES, LargeItem,
     Located, Params, SHORT_ROW, Slot, SmallItem, Totals, WINDOW,
 };
 use pbig_core::Pair;
 use pbig_shaders::{self as shaders, Buffer, Kernel};
-
-/// Maximum number of kernels in one submission. Each takes two timestamps.
-pub(super) const MAX_PASSES: u32 = 24;
 
 /// The number of workgroups of a kernel.
 #[derive(Clone, Copy, Debug)]
@@ -57,32 +55,44 @@ pub(super) fn map_and_check(params: &Params) -> Vec<Step> {
     ]
 }
 
-/// Returns the steps that group pairs by first box, if the chunk has all items and the pairs fit. Their work is a few steps a pair.
-pub(super) fn group(params: &Params) -> Vec<Step> {
+/// Returns the steps that test every pair (Avril 3.2).
+pub(super) fn check_all(params: &Params) -> [Step; 2] {
+    let groups = pair_count(params.boxes).div_ceil(u64::from(LANES));
+    [CLEAR_TOTALS, Run(&shaders::CHECK_ALL, Direct(groups as u32))]
+}
+
+/// Returns the number of pairs of this number of boxes.
+pub(super) fn pair_count(boxes: u32) -> u64 {
+    u64::from(boxes) * u64::from(boxes.saturating_sub(1)) / 2
+}
+
+/// Returns the steps that group this number of pairs by first box. Their work is a few steps a pair.
+pub(super) fn group(boxes: u32, pairs: u32) -> Vec<Step> {
     vec![
-        Run(&shaders::ARRANGE_ROWS, Direct(1)),
-        Clear(Buffer::Rows, bytes_of::<u32>(params.boxes)),
-        Clear(Buffer::Windows, windows_bytes(params)),
-        Run(&shaders::COUNT_PAIRS, Indirect(Dispatches, 24)),
-        RunOnRows(&shaders::SCAN_BLOCKS, Direct(params.boxes.div_ceil(COUNTS_PER_BLOCK))),
+        Clear(Buffer::Rows, bytes_of::<u32>(boxes)),
+        Clear(Buffer::Windows, windows_bytes(boxes, pairs)),
+        Run(&shaders::COUNT_PAIRS, by_pair(pairs)),
+        RunOnRows(&shaders::SCAN_BLOCKS, Direct(boxes.div_ceil(COUNTS_PER_BLOCK))),
         RunOnRows(&shaders::SCAN_SUMS, Direct(1)),
-        Run(&shaders::PLACE_PAIRS, Indirect(Dispatches, 24)),
+        Run(&shaders::PLACE_PAIRS, by_pair(pairs)),
     ]
+}
+
+fn by_pair(pairs: u32) -> Groups {
+    Direct(pairs.div_ceil(LANES))
 }
 
 /// Maximum number of pairs that one dispatch ranks. It reads up to [`SHORT_ROW`] others for each: two billion in all.
 pub(super) const MOST_RANKED: u32 = 1 << 22;
 const _: () = assert!(MOST_RANKED as u64 * SHORT_ROW as u64 <= 1 << 31, "as many as the tests of a dispatch");
 
-/// The numbers of workgroups with which all grouped pairs are ranked at once: at most [`MOST_RANKED`].
-pub(super) const ALL_GROUPED: Groups = Indirect(Dispatches, 24);
-
-/// Returns the steps that order grouped pairs in their rows, and long rows if these pairs are the last.
-pub(super) fn rank(groups: Groups, is_last: bool) -> Vec<Step> {
+/// Returns the steps that order the next grouped pairs in their rows, of this number that are left, and long rows if these pairs are the
+/// last.
+pub(super) fn rank(left: u32) -> Vec<Step> {
     let long_rows =
         [&shaders::PLACE_WINDOWS, &shaders::RANK_WINDOWS].map(|it| Run(it, Indirect(LongRows, 0)));
-    let steps = [Run(&shaders::RANK_PAIRS, groups)].into_iter();
-    steps.chain(long_rows.into_iter().filter(|_| is_last)).collect()
+    let steps = [Run(&shaders::RANK_PAIRS, by_pair(left.min(MOST_RANKED)))].into_iter();
+    steps.chain(long_rows.into_iter().filter(|_| left <= MOST_RANKED)).collect()
 }
 
 /// Returns the steps that check a chunk.
@@ -108,7 +118,7 @@ pub(super) fn make_buffers(
         (Buffer::Located, bytes_of::<Located>(params.boxes)),
         (Buffer::Cells, bytes_of::<Cell>(params.cells)),
         (Buffer::Sums, bytes_of::<u32>(lists.div_ceil(COUNTS_PER_BLOCK))),
-        (Buffer::Dispatches, bytes_of::<[u32; 3]>(3)),
+        (Buffer::Dispatches, bytes_of::<[u32; 3]>(2)),
     ];
     for (buffer, bytes) in buffers {
         storage.ensure(buffer, bytes)?;
@@ -130,24 +140,14 @@ pub(super) fn make_buffers(
     Ok(())
 }
 
-/// Makes the buffers of the sort, for the pairs of this number of words. `params` gets the capacity.
-pub(super) fn make_sort_buffers(
-    storage: &mut Storage,
-    params: &mut Params,
-    words: u64,
-) -> Result<(), GpuError> {
-    storage.ensure(Buffer::Rows, bytes_of::<u32>(params.boxes))?;
-    storage.ensure(Buffer::Grouped, 4 * words)?;
-    params.pair_capacity = pair_capacity(storage);
-    let pieces = most_long_rows(params.pair_capacity);
-    storage.ensure(LongRows, 4 * (u64::from(layout::FIRST_PIECE) + 3 * pieces))?;
-    storage.ensure(Buffer::Windows, windows_bytes(params))?;
-    Ok(())
-}
-
-/// Returns the maximum number of pairs that can be sorted.
-pub(super) fn pair_capacity(storage: &Storage) -> u32 {
-    u32::try_from(storage.size(Buffer::Grouped) / size_of::<Pair>() as u64).unwrap_or(u32::MAX)
+/// Makes the buffers of the sort of this number of pairs.
+pub(super) fn make_sort_buffers(storage: &mut Storage, boxes: u32, pairs: u32) -> Result<(), GpuError> {
+    storage.ensure(Buffer::Rows, bytes_of::<u32>(boxes))?;
+    storage.ensure(Buffer::Grouped, bytes_of::<Pair>(pairs))?;
+    storage.ensure(Buffer::Windows, windows_bytes(boxes, pairs))?;
+    storage.ensure(LongRows, 4 * (u64::from(layout::FIRST_PIECE) + 3 * most_long_rows(pairs)))?;
+    // An indirect dispatch of no workgroups, and no piece: `rank_pairs` adds them.
+    storage.write(LongRows, &[0, 0, 1, 0])
 }
 
 /// Returns the maximum number of long rows of this number of pairs, which is also that of their pieces.
@@ -156,8 +156,8 @@ fn most_long_rows(pairs: u32) -> u64 {
 }
 
 /// Returns the bytes of the counters of the windows of long rows.
-fn windows_bytes(params: &Params) -> u64 {
-    4 * most_long_rows(params.pair_capacity) * u64::from(params.boxes.div_ceil(WINDOW))
+fn windows_bytes(boxes: u32, pairs: u32) -> u64 {
+    4 * most_long_rows(pairs) * u64::from(boxes.div_ceil(WINDOW))
 }
 
 /// Returns true if all lists of the map fitted into their buffers.
@@ -168,13 +168,22 @@ pub(super) fn lists_fit(params: &Params, found: &Counters) -> bool {
         && found.large_items <= params.large_capacity
 }
 
+/// Returns true if nothing has to be repeated with more room or another plan.
+pub(super) fn fits(params: &Params, found: &Counters) -> bool {
+    lists_fit(params, found) && tests_fit(params, found)
+}
+
+/// Returns true if the work items need no more tests than the plan promised.
+pub(super) fn tests_fit(params: &Params, found: &Counters) -> bool {
+    found.tests <= params.most_tests && found.too_many_tests == 0
+}
+
 /// A submission that is being recorded.
 pub(super) struct Recording<'a> {
     pub(super) storage: &'a mut Storage,
     pub(super) encoder: &'a mut wgpu::CommandEncoder,
     pub(super) variant: Variant,
-    pub(super) queries: Option<&'a wgpu::QuerySet>,
-    pub(super) passes: Vec<&'static Kernel>,
+    pub(super) timer: Option<&'a mut Timer>,
 }
 
 /// A kernel with its number of workgroups and its choices.
@@ -182,30 +191,23 @@ type Dispatch = (&'static Kernel, Groups, Variant);
 
 impl Recording<'_> {
     /// Records steps: first everything that is cleared, then the kernels. They share a pass, unless each is timed.
-    pub(super) fn record(&mut self, steps: &[Step]) {
+    pub(super) fn record(mut self, steps: &[Step]) {
         let mut kernels = Vec::with_capacity(steps.len());
         for &step in steps {
             match step {
                 Clear(buffer, bytes) => {
-                    let buffer = self.storage.get(buffer);
-                    self.encoder.clear_buffer(buffer, 0, Some(bytes));
+                    self.encoder.clear_buffer(self.storage.get(buffer), 0, Some(bytes));
                 }
                 Run(_, Direct(0)) => {}
                 Run(kernel, groups) => kernels.push((kernel, groups, self.variant)),
                 RunOnRows(kernel, groups) => kernels.push((kernel, groups, self.variant.of_rows())),
             }
         }
-        let Some(query_set) = self.queries else {
+        let Some(timer) = self.timer.take() else {
             return self.run(&kernels, None);
         };
         for kernel in kernels {
-            let at = 2 * self.passes.len() as u32;
-            let writes = wgpu::ComputePassTimestampWrites {
-                query_set,
-                beginning_of_pass_write_index: Some(at),
-                end_of_pass_write_index: Some(at + 1),
-            };
-            self.run(&[kernel], Some(writes));
+            self.run(&[kernel], timer.time(kernel.0));
         }
     }
 
@@ -222,7 +224,6 @@ impl Recording<'_> {
                 Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
                 Indirect(buffer, at) => pass.dispatch_workgroups_indirect(self.storage.get(buffer), at),
             }
-            self.passes.push(kernel);
         }
     }
 }

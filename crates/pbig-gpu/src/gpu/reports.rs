@@ -2,26 +2,16 @@
 
 use super::GpuError;
 use super::gpu_device::GpuDevice;
-use super::readback::Mapped;
-use crate::layout::{Counters, SUMMARY_WORDS, Totals};
+use super::readback::{Counts, Mapped};
+use crate::layout::SUMMARY_WORDS;
 use crate::pbig::Summary;
-use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Maximum number of calls whose counts are on their way. The counts of further calls stay on the device.
 const MOST_REPORTS: usize = 4;
 
-/// The counts of a call.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub(super) struct Counts {
-    pub(super) counters: Counters,
-    pub(super) totals: Totals,
-}
-
-const COUNTS_BYTES: u64 = size_of::<Counts>() as u64;
-const REPORT_BYTES: u64 = COUNTS_BYTES + 4 * SUMMARY_WORDS as u64;
+const REPORT_BYTES: u64 = Counts::BYTES + 4 * SUMMARY_WORDS as u64;
 
 /// The device has not been told to fill the buffer, or its commands were thrown away.
 const FREE: u8 = 0;
@@ -72,9 +62,9 @@ impl Slot {
     /// Reads a report, and frees the buffer.
     fn read(&self, device: &GpuDevice) -> Option<Learned> {
         self.state.store(FREE, Ordering::Relaxed);
-        let bytes = if self.has_summary { REPORT_BYTES } else { COUNTS_BYTES };
+        let bytes = if self.has_summary { REPORT_BYTES } else { Counts::BYTES };
         let mapped = Mapped::new(device, &self.staging, bytes).ok()?;
-        let (counts, words) = mapped.split_at(COUNTS_BYTES as usize);
+        let (counts, words) = mapped.split_at(Counts::BYTES as usize);
         let summary = self.has_summary.then(|| Summary::of_device(bytemuck::cast_slice(words), self.boxes));
         Some(Learned {
             counts: bytemuck::pod_read_unaligned(counts),
@@ -104,11 +94,9 @@ impl Reports {
     ) -> Result<(), GpuError> {
         let Some(slot) = self.free(device)? else { return Ok(()) };
         (slot.has_summary, slot.boxes, slot.plan) = (summary.is_some(), boxes, plan);
-        let counters_bytes = size_of::<Counters>() as u64;
-        encoder.copy_buffer_to_buffer(counters, 0, &slot.staging, 0, counters_bytes);
-        encoder.copy_buffer_to_buffer(totals, 0, &slot.staging, counters_bytes, size_of::<Totals>() as u64);
+        Counts::copy(encoder, [counters, totals, &slot.staging]);
         if let Some(summary) = summary {
-            encoder.copy_buffer_to_buffer(summary, 0, &slot.staging, COUNTS_BYTES, 4 * SUMMARY_WORDS as u64);
+            encoder.copy_buffer_to_buffer(summary, 0, &slot.staging, Counts::BYTES, 4 * SUMMARY_WORDS as u64);
         }
         slot.state.store(IN_FLIGHT, Ordering::Relaxed);
         let state = slot.state.clone();

@@ -4,16 +4,15 @@
 //! wrong plan or length costs time, or the call says that it is not complete.
 
 use super::GpuError;
+use super::forecast::{Forecast, needs_grid};
 use super::gpu_device::{GpuDevice, Variant};
 use super::kept_plan::{FINER_RETRY, KeptPlan};
-use super::passes::{self, CLEAR_TOTALS, Groups, Recording, Step};
+use super::passes::{self, Groups, Recording, Step};
 use super::reports::{Learned, Reports};
-use super::session::{check_entries, first_bytes, params_of};
 use super::storage::Storage;
 use crate::GpuOptions;
-use crate::decode::pair_count;
 use crate::layout::{
-    Chunk, Counters, DeviceBox, LANES, PairCount, Params, SUMMARY_WORDS, Totals, UNPLANNED, halves, wide,
+    Chunk, Counters, DeviceBox, LANES, PairCount, Params, SUMMARY_WORDS, UNPLANNED, halves, wide,
 };
 use pbig_core::ProxyFilter;
 use pbig_shaders::{self as shaders, Buffer};
@@ -50,16 +49,11 @@ pub(super) struct Resident {
     options: GpuOptions,
     storage: Storage,
     reports: Reports,
-    plan: Option<KeptPlan>,
+    forecast: Forecast,
     /// Number of plans so far: a report of an earlier one says nothing of the present one.
     plans: u32,
-    cell_factor: f32,
     /// The boxes have outgrown the plan, or there is none: the next call measures them.
     wants_measure: bool,
-    /// Lengths of the lists that a call needed.
-    lists: Counters,
-    /// Words of output that a call needed.
-    words: u64,
     /// The uniforms of the last call.
     uniforms: Option<(Params, Chunk)>,
     /// Hash of the caller's buffers that were used last.
@@ -72,12 +66,9 @@ impl Resident {
             options: *options,
             storage: Storage::new(device.clone(), options),
             reports: Reports::default(),
-            plan: None,
+            forecast: Forecast::new(),
             plans: 0,
-            cell_factor: 1.0,
             wants_measure: true,
-            lists: Counters::default(),
-            words: 0,
             uniforms: None,
             used: None,
         }
@@ -101,7 +92,7 @@ impl Resident {
         let prepared = self.prepare(boxes);
         if prepared.is_err() {
             // Lists that exceed a limit say nothing of the next boxes.
-            (self.lists, self.words) = Default::default();
+            (self.forecast.lists, self.forecast.words) = Default::default();
         }
         let params = prepared?;
         self.copy_boxes(encoder, boxes);
@@ -139,70 +130,52 @@ impl Resident {
     /// Takes the counts of an earlier call into account, unless there is another plan since.
     fn learn(&mut self, learned: Learned) {
         let Learned { counts, summary, boxes, plan } = learned;
-        let needs_plan = self.needs_plan(boxes);
+        let needs_plan = needs_grid(&self.options, boxes);
         if needs_plan && plan != self.plans {
             return;
         }
         // Without room for the lists nothing was checked. The number of pairs does not depend on the plan.
         let words = wide(counts.totals.words);
-        self.words = if words > 0 { words } else { self.words };
+        let forecast = &mut self.forecast;
+        forecast.words = if words > 0 { words } else { forecast.words };
         if let Some(summary) = summary {
             let max_bytes = self.storage.max_buffer_bytes;
-            let made = KeptPlan::of(&summary, boxes, (&self.options, self.cell_factor), max_bytes);
-            (self.plan, self.plans, self.wants_measure) = (Some(made), self.plans + 1, false);
+            let made = KeptPlan::of(&summary, boxes, (&self.options, forecast.cell_factor), max_bytes);
+            (forecast.plan, self.plans, self.wants_measure) = (Some(made), self.plans + 1, false);
             return;
         }
-        if let Some(kept) = self.plan.as_mut().filter(|_| needs_plan) {
+        if let Some(kept) = forecast.plan.as_mut().filter(|_| needs_plan) {
             if kept.refuses(&counts.counters, boxes, self.options.boxes_per_cell) {
                 return self.replan();
             }
             self.wants_measure |= kept.is_outgrown_after(&counts.counters);
         }
         if needs_plan {
-            self.lists = counts.counters;
+            self.forecast.lists = counts.counters;
         }
     }
 
     /// Gives up a plan that makes too many tests. One that was made for these boxes is followed by one of finer cells.
     fn replan(&mut self) {
-        let is_new = self.plan.as_ref().is_some_and(KeptPlan::is_new);
+        let forecast = &mut self.forecast;
+        let is_new = forecast.plan.as_ref().is_some_and(KeptPlan::is_new);
         if !self.wants_measure {
-            self.cell_factor = if is_new && self.cell_factor == 1.0 { FINER_RETRY } else { 1.0 };
+            forecast.cell_factor = if is_new && forecast.cell_factor == 1.0 { FINER_RETRY } else { 1.0 };
         }
         self.wants_measure = true;
     }
 
-    /// Returns true if not every pair is tested.
-    fn needs_plan(&self, boxes: u32) -> bool {
-        boxes > self.options.all_pairs_up_to.max(1)
-    }
-
     /// Makes the buffers of a call, and returns its parameters.
     fn prepare(&mut self, boxes: &DeviceBoxes<'_>) -> Result<Params, GpuError> {
-        let needs_plan = self.needs_plan(boxes.count);
-        let (storage, options) = (&mut self.storage, &self.options);
-        let mut params = params_of(options, storage, boxes.count, boxes.filters.is_some(), 0);
-        let first = first_bytes(options, boxes.count).min(storage.max_buffer_bytes);
-        if needs_plan {
-            match &self.plan {
-                Some(kept) => {
-                    check_entries(kept, boxes.count)?;
-                    params = kept.plan.add_to(params);
-                    params.most_tests = kept.most_tests(boxes.count, options.boxes_per_cell);
-                    passes::make_buffers(storage, &mut params, &self.lists, first)?;
-                    self.wants_measure |= !kept.suits(boxes.count as usize);
-                }
-                None => params.flags |= UNPLANNED,
-            }
-        }
+        let (storage, options, count) = (&mut self.storage, &self.options, boxes.count);
+        let params = self.forecast.params(storage, options, count, boxes.filters.is_some())?;
+        let is_outgrown = |kept: &KeptPlan| params.levels > 0 && !kept.suits(count as usize);
+        self.wants_measure |= self.forecast.plan.as_ref().is_some_and(is_outgrown);
         let sizes = [
-            (Buffer::Boxes, size_of::<DeviceBox>() as u64 * u64::from(boxes.count)),
-            (Buffer::Filters, boxes.filters.map_or(0, |_| FILTER_BYTES * u64::from(boxes.count))),
-            (Buffer::Counters, size_of::<Counters>() as u64),
-            (Buffer::Totals, size_of::<Totals>() as u64),
+            (Buffer::Boxes, BOX_BYTES * u64::from(count)),
+            (Buffer::Filters, boxes.filters.map_or(0, |_| FILTER_BYTES * u64::from(count))),
             (Buffer::Summary, 4 * u64::from(SUMMARY_WORDS)),
             (Buffer::PairCount, size_of::<PairCount>() as u64),
-            (Buffer::Out, (4 * self.words).clamp(first, storage.max_buffer_bytes)),
         ];
         sizes.into_iter().try_for_each(|(buffer, bytes)| storage.ensure(buffer, bytes))?;
         self.set_uniforms(&params)?;
@@ -238,28 +211,26 @@ impl Resident {
     }
 
     fn record_steps(&mut self, encoder: &mut wgpu::CommandEncoder, params: &Params) {
-        let clear = Step::Clear(Buffer::Counters, size_of::<Counters>() as u64);
-        let mut steps = if params.levels > 0 {
-            passes::map_and_check(params)
-        } else if params.flags & UNPLANNED != 0 {
-            vec![CLEAR_TOTALS, clear]
+        let mut steps = vec![Step::Clear(Buffer::Counters, size_of::<Counters>() as u64)];
+        if params.levels > 0 {
+            steps = passes::map_and_check(params);
+        } else if params.flags & UNPLANNED == 0 {
+            steps.extend(passes::check_all(params));
         } else {
-            let items = pair_count(params.boxes).div_ceil(u64::from(LANES)) as u32;
-            vec![CLEAR_TOTALS, clear, Step::Run(&shaders::CHECK_ALL, Groups::Direct(items))]
-        };
+            steps.push(passes::CLEAR_TOTALS);
+        }
         if self.measures(params) {
             steps.push(Step::Clear(Buffer::Summary, 4 * u64::from(SUMMARY_WORDS)));
             steps.push(Step::Run(&shaders::MEASURE, Groups::Direct(params.boxes.div_ceil(LANES))));
         }
         steps.push(Step::Run(&shaders::CONCLUDE, Groups::Direct(1)));
         let (storage, variant) = (&mut self.storage, Variant::new(&self.options));
-        let mut recording = Recording { storage, encoder, variant, queries: None, passes: Vec::new() };
-        recording.record(&steps);
+        Recording { storage, encoder, variant, timer: None }.record(&steps);
     }
 
     /// Returns true if a call measures the boxes.
     fn measures(&self, params: &Params) -> bool {
-        self.wants_measure && self.needs_plan(params.boxes)
+        self.wants_measure && needs_grid(&self.options, params.boxes)
     }
 
     /// Lets the counts come home, where a later call finds them.

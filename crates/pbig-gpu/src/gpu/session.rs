@@ -1,35 +1,25 @@
-//! The state of a finder on a device, and what happens before a search: upload, plan, choice of the coding.
+//! A search whose boxes come from the host and whose pairs go there. One wait tells the counts, another one brings the pairs, unless they
+//! are few. Lists that did not fit are made longer, and the search is repeated.
 
 use super::GpuError;
 use super::error::Failure;
-use super::gpu_device::GpuDevice;
-use super::job::Job;
-use super::kept_plan::KeptPlan;
-use super::readback::Timestamps;
-use super::sink::Sink;
+use super::forecast::{Forecast, needs_grid};
+use super::gpu_device::{GpuDevice, Variant};
+use super::items::{cut, rest};
+use super::kept_plan::{FINER_RETRY, KeptPlan};
+use super::passes::{self, MOST_RANKED, Recording, Step, pair_count};
+use super::readback::Counts;
 use super::storage::{Storage, Upload};
+use super::timer::Timer;
 use crate::GpuOptions;
-use crate::decode::pair_count;
-use crate::layout::{COUNTED, Counters, FILTERED, LANES, Params};
-use crate::policy::WIDEST_ITEM;
+use crate::layout::{Chunk, Counters, LANES, Params, halves, wide};
 use pbig_core::internal::Clock;
+use pbig_core::{Aabb, DeviceFound, Pair, PairList, SearchRequest};
 use pbig_shaders::Buffer;
 use std::sync::Arc;
 
-/// Number of boxes by which lists of the first call are longer than for the boxes there are: few boxes may need many entries.
-const EXTRA_BOXES: u64 = 4096;
-
-/// Lengths of lists and output that earlier calls needed.
-#[derive(Debug, Default)]
-pub(super) struct Sizes {
-    /// Lengths of the lists of the map in the last call.
-    pub(super) lists: Counters,
-    /// Expected words of output of a chunk: these are prefetched.
-    pub(super) expected_words: u64,
-    /// Maximum number of words of a chunk of this job.
-    pub(super) max_words: u64,
-    pub(super) word_capacity: u64,
-}
+/// Maximum number of repetitions. Each one has the room that the last one asked for.
+const MAX_REPEATS: u32 = 8;
 
 /// The state of a finder on a device, kept from call to call.
 #[derive(Debug)]
@@ -37,22 +27,17 @@ pub(super) struct Session {
     pub(super) device: Arc<GpuDevice>,
     pub(super) options: GpuOptions,
     pub(super) storage: Storage,
-    /// Timestamps, if kernels are timed. Submissions use them one after the other.
-    pub(super) timestamps: Option<Timestamps>,
-    pub(super) sizes: Sizes,
-    pub(super) plan: Option<KeptPlan>,
-    /// Factor on the cells of a new plan: below 1 if this job's first plan made too many tests.
-    pub(super) cell_factor: f32,
-    /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
-    pub(super) split: Option<(usize, usize)>,
-    /// The call's ids of this job's boxes, if it is a part of the call.
-    pub(super) part_ids: Option<Vec<u32>>,
-    /// Entries of this job's map, once fetched.
-    pub(super) table: Option<Vec<u32>>,
-    /// Parameters of this job.
+    pub(super) timer: Option<Timer>,
+    pub(super) forecast: Forecast,
+    /// Parameters of this call.
     pub(super) params: Params,
-    /// Pairs and counts of this call so far.
-    pub(super) sink: Sink,
+    max_pairs: u64,
+    /// Pairs and report of this call.
+    pub(super) found: DeviceFound,
+    /// Words of pairs that came with the counts.
+    pub(super) prefetched: Vec<u32>,
+    /// Number of submissions since the last wait.
+    pub(super) submissions: u32,
 }
 
 impl Session {
@@ -60,128 +45,231 @@ impl Session {
         Ok(Self {
             options: *options,
             storage: Storage::new(device.clone(), options),
-            timestamps: Timestamps::new(&device, options)?,
-            sizes: Sizes::default(),
-            plan: None,
-            cell_factor: 1.0,
-            split: None,
-            part_ids: None,
-            table: None,
+            timer: Timer::new(&device, options)?,
+            forecast: Forecast::new(),
             params: Params::default(),
-            sink: Sink::default(),
+            max_pairs: 0,
+            found: DeviceFound::default(),
+            prefetched: Vec::new(),
+            submissions: 0,
             device,
         })
     }
 
-    /// Notes the end of a call, which is one job or several.
-    pub(super) fn end_call(&mut self) {
-        if self.storage.end_call() {
-            self.split = None;
+    /// Finds all pairs. The result uses the memory of `pairs`.
+    pub(super) async fn search(
+        &mut self,
+        request: &SearchRequest<'_>,
+        mut pairs: PairList,
+    ) -> Result<DeviceFound, Failure> {
+        pairs.clear();
+        self.found = DeviceFound::default();
+        (self.found.pairs, self.max_pairs, self.submissions) = (pairs, request.max_pairs, 0);
+        self.timer.iter_mut().for_each(Timer::start);
+        if request.boxes.len() < 2 {
+            self.found.valid = count_valid(request.boxes);
+            return Ok(std::mem::take(&mut self.found));
         }
+        self.upload(request)?;
+        let counts = self.count(request).await?;
+        self.note(request, &counts);
+        self.take_pairs(wide(counts.totals.words), request.is_sorted).await?;
+        self.take_times().await?;
+        self.storage.end_call();
+        Ok(std::mem::take(&mut self.found))
     }
 
-    /// Forgets what a call without an answer has left: a plan that no search has used was made for its boxes.
-    pub(super) fn forget_call(&mut self) {
-        self.sink = Sink::default();
-        self.plan.take_if(|kept| kept.is_new());
-    }
-
-    /// Searches the boxes of a job, and adds its pairs and counts to those of the call.
-    pub(super) async fn run(&mut self, job: &Job<'_>) -> Result<(), Failure> {
-        self.upload(job)?;
-        let result = self.search(job).await;
-        let (found, lists) = (&mut self.sink.found, &self.sizes.lists);
-        let tests = if job.needs_grid(&self.options) {
-            found.valid = lists.valid;
-            found.report.cells += self.plan.as_ref().map_or(0, |kept| u64::from(kept.plan.cells));
-            found.report.entries += u64::from(lists.entries);
-            u64::from(LANES) * u64::from(lists.tests)
-        } else {
-            found.valid = job.valid();
-            pair_count(self.params.boxes)
-        };
-        if !self.options.count_tests {
-            found.checks.made += tests;
-        }
-        found.report.device_bytes = found.report.device_bytes.max(self.storage.bytes());
-        result
-    }
-
-    /// Uploads the boxes of a job, and sets its parameters, without grid and capacities.
-    fn upload(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
-        self.table = None;
-        self.sizes.expected_words = std::mem::take(&mut self.sizes.max_words);
-        let is_first = self.sizes.expected_words == 0 && self.sizes.lists == Counters::default();
-        if is_first && self.options.first_bytes > 0 {
-            // A pair a box.
-            self.sizes.expected_words = 2 * job.boxes.len() as u64;
-        }
-        self.sizes.word_capacity = self.sizes.expected_words;
-        let (boxes, has_filters) = (job.boxes.len() as u32, job.filters.is_some());
-        self.params = params_of(&self.options, &self.storage, boxes, has_filters, job.split.unwrap_or(0));
+    /// Uploads all boxes: to find those that moved, the host would have to read a copy of the last call's, too.
+    fn upload(&mut self, request: &SearchRequest<'_>) -> Result<(), GpuError> {
         let mut clock = Clock::start();
-        // A failed upload leaves its bytes.
-        self.storage.bytes_sent = 0;
-        self.storage.upload(&[
-            // All boxes: to find those that moved, the host would have to read a copy of the last call's, too.
-            Upload::new(Buffer::Boxes, job.boxes),
-            Upload::new(Buffer::Filters, job.filters.unwrap_or(&[])),
-        ])?;
-        let report = &mut self.sink.found.report;
-        report.uploaded += std::mem::take(&mut self.storage.bytes_sent);
-        report.upload += clock.lap();
-        Ok(())
-    }
-
-    /// Adds to the parameters what a plan and the coding of the output set.
-    pub(super) fn add_plan(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
-        if job.needs_grid(&self.options) {
-            self.plan.take_if(|kept| !kept.suits(job.boxes.len()));
-            let (options, factor, max_bytes) =
-                (&self.options, self.cell_factor, self.storage.max_buffer_bytes);
-            let report = &mut self.sink.found.report;
-            let kept = self.plan.get_or_insert_with(|| {
-                let mut clock = Clock::start();
-                let plan = KeptPlan::new(job.boxes, (options, factor), max_bytes);
-                report.plan += clock.lap();
-                plan
-            });
-            check_entries(kept, self.params.boxes)?;
-            self.params = kept.plan.add_to(self.params);
-            self.params.most_tests = kept.most_tests(self.params.boxes, options.boxes_per_cell);
+        let (count, limit) = (request.boxes.len() as u64, self.storage.max_boxes());
+        if count > limit {
+            let [bytes, limit] = [count, limit].map(|boxes| boxes * size_of::<Aabb>() as u64);
+            return Err(GpuError::TooLarge { what: "boxes", bytes, limit });
         }
-        self.params.flags |= self.coding_flag(job);
+        let boxes = Upload::new(Buffer::Boxes, request.boxes);
+        let filters = Upload::new(Buffer::Filters, request.filters.unwrap_or(&[]));
+        self.found.report.uploaded = self.storage.upload(&[boxes, filters])?;
+        self.submissions += 1;
+        self.found.report.upload = clock.lap();
+        Ok(())
+    }
+
+    /// Checks all pairs, again with more room if lists or pairs did not fit. Returns the counts.
+    async fn count(&mut self, request: &SearchRequest<'_>) -> Result<Counts, Failure> {
+        self.forecast.cell_factor = 1.0;
+        // A plan that no search has used was made for the boxes of a call without an answer.
+        self.forecast.plan.take_if(|kept| kept.is_new());
+        let boxes = request.boxes.len() as u32;
+        for _ in 0..MAX_REPEATS {
+            self.plan(request.boxes);
+            let (storage, options) = (&mut self.storage, &self.options);
+            self.params = self.forecast.params(storage, options, boxes, request.filters.is_some())?;
+            let counts = self.check().await?;
+            if self.accepts(&counts)? {
+                return Ok(counts);
+            }
+            self.found.report.repeats += 1;
+        }
+        Err(GpuError::Refused("counts that contradict each other".into()).into())
+    }
+
+    /// Makes a plan if the boxes need one, and there is none or one for many more or fewer boxes.
+    fn plan(&mut self, boxes: &[Aabb]) {
+        let forecast = &mut self.forecast;
+        forecast.plan.take_if(|kept| !kept.suits(boxes.len()));
+        if forecast.plan.is_none() && needs_grid(&self.options, boxes.len() as u32) {
+            let mut clock = Clock::start();
+            let settings = (&self.options, forecast.cell_factor);
+            forecast.plan = Some(KeptPlan::new(boxes, settings, self.storage.max_buffer_bytes));
+            self.found.report.plan += clock.lap();
+        }
+    }
+
+    /// Sorts the boxes into cells, and checks their work items, a chunk in each submission. Returns the counts.
+    async fn check(&mut self) -> Result<Counts, GpuError> {
+        self.found.report.chunks = 1;
+        if self.params.levels == 0 {
+            self.submit(Chunk::default(), &passes::check_all(&self.params))?;
+            return self.counts().await;
+        }
+        let [small_items, large_items] = self.chunk_items();
+        let first = Chunk { small_items, large_items, ..Chunk::default() };
+        self.submit(first, &passes::map_and_check(&self.params))?;
+        let counts = self.counts().await?;
+        let others = cut(rest(&counts.counters, &first), self.chunk_items());
+        if others.is_empty() || !passes::fits(&self.params, &counts.counters) {
+            return Ok(counts);
+        }
+        for chunk in &others {
+            self.submit(*chunk, &passes::check(chunk))?;
+        }
+        self.found.report.chunks += others.len() as u32;
+        self.counts().await
+    }
+
+    /// Returns the numbers of small and of large work items of a chunk. A software adapter gets fewer, so that it answers in time.
+    fn chunk_items(&self) -> [u32; 2] {
+        let share = if self.device.is_software { 4 } else { 1 };
+        self.options.chunk.map(|items| (items / share).max(1))
+    }
+
+    /// Notes the lengths that a check needed. Returns false if it had less room.
+    fn accepts(&mut self, counts: &Counts) -> Result<bool, Failure> {
+        let Counts { counters, totals } = counts;
+        if self.params.levels > 0 {
+            self.forecast.lists = *counters;
+            // First: lists that a plan for other boxes makes are not worth their memory.
+            if !passes::tests_fit(&self.params, counters) {
+                return self.replan().map(|()| false);
+            }
+            if !passes::lists_fit(&self.params, counters) {
+                return Ok(false);
+            }
+        }
+        let words = wide(totals.words);
+        if words / 2 > self.max_pairs {
+            return Err(Failure::TooManyPairs);
+        }
+        self.forecast.words = words;
+        Ok(words <= self.storage.size(Buffer::Out) / 4)
+    }
+
+    /// Gives up a plan that makes too many tests: it may have been made for other boxes. One that was made for these is tried once
+    /// more, with finer cells: a few boxes far away leave too large ones.
+    ///
+    /// # Errors
+    /// If that is done: the call is declined.
+    fn replan(&mut self) -> Result<(), Failure> {
+        let forecast = &mut self.forecast;
+        let was_new = forecast.plan.take().is_some_and(|kept| kept.is_new());
+        let Counters { tests, too_many_tests, .. } = std::mem::take(&mut forecast.lists);
+        if !was_new {
+            return Ok(());
+        }
+        if forecast.cell_factor > FINER_RETRY {
+            forecast.cell_factor = FINER_RETRY;
+            return Ok(());
+        }
+        let Params { boxes, most_tests, .. } = self.params;
+        let [tests, most] = [tests, most_tests].map(|tests| u64::from(LANES) * u64::from(tests));
+        // The number wraps around beyond 32 bits of workgroups.
+        let tests = if too_many_tests > 0 { "over 2^40".to_owned() } else { tests.to_string() };
+        Err(Failure::Declined(format!(
+            "the device declined {tests} tests of {boxes} boxes, more than {most}"
+        )))
+    }
+
+    /// Notes the grid, the tests and the memory of the call.
+    fn note(&mut self, request: &SearchRequest<'_>, counts: &Counts) {
+        let (found, Counts { counters, totals }) = (&mut self.found, counts);
+        found.report.device_bytes = self.storage.bytes();
+        if self.params.levels == 0 {
+            found.valid = count_valid(request.boxes);
+            found.checks.made = pair_count(self.params.boxes);
+        } else if let Some(kept) = &mut self.forecast.plan {
+            found.valid = counters.valid;
+            found.checks.made = u64::from(LANES) * u64::from(counters.tests);
+            found.plan = Some(kept.plan.to_string());
+            (found.report.cell, found.report.cells) = (kept.plan.cell, kept.plan.cells.into());
+            found.report.entries = counters.entries.into();
+            if kept.is_outgrown_after(counters) {
+                self.forecast.plan = None;
+            }
+        }
+        if self.options.count_tests {
+            let [made, redundant, overlaps] = [totals.made, totals.redundant, totals.overlaps].map(wide);
+            (found.checks.made, found.checks.redundant) = (made, redundant);
+            found.checks.unnecessary = made.saturating_sub(redundant + overlaps);
+        }
+    }
+
+    /// Takes the pairs of this number of words, in order if the caller wants it and the device can sort so many.
+    async fn take_pairs(&mut self, words: u64, is_sorted: bool) -> Result<(), Failure> {
+        if words <= self.prefetched.len() as u64 {
+            let mut pairs: Vec<Pair> = bytemuck::cast_slice(&self.prefetched[..words as usize]).to_vec();
+            pairs.sort_unstable();
+            return self.append(&pairs);
+        }
+        let is_sorted = is_sorted && self.params.levels > 0 && self.sort(words)?;
+        self.read_pairs(words).await?;
+        let is_out_of_order = is_sorted && !self.found.pairs.is_in_order();
+        if is_out_of_order { Err(GpuError::BadPairs("out of order".into()).into()) } else { Ok(()) }
+    }
+
+    /// Sorts the pairs of this number of words, a part of them in each submission. Returns false if there is no room for that.
+    fn sort(&mut self, words: u64) -> Result<bool, GpuError> {
+        let pairs = u32::try_from(words / 2).unwrap_or(u32::MAX);
+        match passes::make_sort_buffers(&mut self.storage, self.params.boxes, pairs) {
+            Err(GpuError::TooLarge { .. } | GpuError::OverBudget { .. }) => return Ok(false),
+            made => made?,
+        }
+        self.submit(Chunk::default(), &passes::group(self.params.boxes, pairs))?;
+        for first_pair in (0..pairs).step_by(MOST_RANKED as usize) {
+            let left = pairs - first_pair;
+            self.submit(Chunk { first_pair, ..Chunk::default() }, &passes::rank(left))?;
+        }
+        Ok(true)
+    }
+
+    /// Records and submits kernels that check these work items. Beyond the limits they count, and write no more.
+    fn submit(&mut self, items: Chunk, steps: &[Step]) -> Result<(), GpuError> {
+        let mut clock = Clock::start();
+        let words = (self.storage.size(Buffer::Out) / 4).min(u64::from(u32::MAX) - 1);
+        let chunk = Chunk { word_capacity: words as u32, pairs_left: halves(self.max_pairs), ..items };
+        self.storage.write(Buffer::Params, &[self.params])?;
+        self.storage.write(Buffer::Chunk, &[chunk])?;
+        let mut encoder = self.device.encoder();
+        let (storage, variant) = (&mut self.storage, Variant::new(&self.options));
+        let (encoder_ref, timer) = (&mut encoder, self.timer.as_mut());
+        Recording { storage, encoder: encoder_ref, variant, timer }.record(steps);
+        self.device.submit(encoder);
+        self.submissions += 1;
+        self.found.report.record += clock.lap();
         Ok(())
     }
 }
 
-/// Returns the bytes of a list whose length no call has told.
-pub(super) fn first_bytes(options: &GpuOptions, boxes: u32) -> u64 {
-    options.first_bytes * (u64::from(boxes) + EXTRA_BOXES)
-}
-
-/// Returns the parameters of a call, without grid and capacities.
-pub(super) fn params_of(
-    options: &GpuOptions,
-    storage: &Storage,
-    boxes: u32,
-    has_filters: bool,
-    split: u32,
-) -> Params {
-    Params {
-        boxes,
-        small_cell: options.small_cell.clamp(1, LANES),
-        // The output of a work item must fit the smallest buffer.
-        columns: if storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
-        flags: FILTERED * u32::from(has_filters) + COUNTED * u32::from(options.count_tests),
-        split,
-        ..Params::default()
-    }
-}
-
-/// Returns an error if 32 bits might not count the entries of this number of boxes: up to 4 x 4 x 4 in each level but the last.
-pub(super) fn check_entries(kept: &KeptPlan, boxes: u32) -> Result<(), GpuError> {
-    let entries = u64::from(boxes) * (64 * (kept.plan.levels.len() as u64 - 1) + 1);
-    let limit = u64::from(u32::MAX);
-    if entries > limit { Err(GpuError::TooLarge { what: "entries", bytes: entries, limit }) } else { Ok(()) }
+fn count_valid(boxes: &[Aabb]) -> u32 {
+    boxes.iter().filter(|one| one.is_valid()).count() as u32
 }

@@ -33,10 +33,8 @@ const PIECE_BYTES: usize = 1 << 19;
 pub(super) enum BufferId {
     /// A buffer that kernels bind.
     Bound(Buffer),
-    /// The buffer through which the host reads the counts of a chunk.
-    Staging,
     /// One of two buffers through which the host reads other buffers, piece by piece.
-    FetchStaging(usize),
+    Staging(usize),
     /// The buffer through which the host writes a list.
     UploadStaging(Buffer),
 }
@@ -51,8 +49,7 @@ impl BufferId {
     fn name(self) -> &'static str {
         match self {
             Self::Bound(buffer) => buffer.name(),
-            Self::Staging => "staging",
-            Self::FetchStaging(_) => "fetch staging",
+            Self::Staging(_) => "staging",
             Self::UploadStaging(_) => "upload staging",
         }
     }
@@ -60,9 +57,10 @@ impl BufferId {
     fn usage(self) -> wgpu::BufferUsages {
         use wgpu::BufferUsages as Usage;
         match self {
-            Self::Staging | Self::FetchStaging(_) => Usage::MAP_READ | Usage::COPY_DST,
+            Self::Staging(_) => Usage::MAP_READ | Usage::COPY_DST,
             Self::UploadStaging(_) => Usage::MAP_WRITE | Usage::COPY_SRC,
-            Self::Bound(Buffer::Dispatches | Buffer::LongRows) => Usage::STORAGE | Usage::INDIRECT,
+            Self::Bound(Buffer::Dispatches) => Usage::STORAGE | Usage::INDIRECT,
+            Self::Bound(Buffer::LongRows) => Usage::STORAGE | Usage::INDIRECT | Usage::COPY_DST,
             Self::Bound(Buffer::PairCount) => {
                 Usage::STORAGE | Usage::INDIRECT | Usage::COPY_DST | Usage::COPY_SRC
             }
@@ -105,11 +103,7 @@ pub(super) struct Storage {
     pub(super) max_buffer_bytes: u64,
     /// Largest size of all buffers together, in bytes.
     max_total_bytes: u64,
-    /// Bytes of lists that went up and were not yet reported.
-    pub(super) bytes_sent: u64,
     buffers: HashMap<BufferId, KeptBuffer>,
-    /// Copies from staging buffers, which the next submission makes, and the lists that they copy.
-    pub(super) copies: Option<(wgpu::CommandEncoder, Vec<Buffer>)>,
     /// Bind groups of the present buffers.
     bind_groups: HashMap<(&'static str, Variant), wgpu::BindGroup>,
     calls: u32,
@@ -121,9 +115,7 @@ impl Storage {
             max_buffer_bytes: device.max_buffer_bytes(options),
             max_total_bytes: options.max_total_bytes,
             device,
-            bytes_sent: 0,
             buffers: HashMap::new(),
-            copies: None,
             bind_groups: HashMap::new(),
             calls: 0,
         }
@@ -199,24 +191,20 @@ impl Storage {
         Ok(())
     }
 
-    /// Makes the buffers of lists, and writes these into staging buffers, from where the next submission copies them.
-    pub(super) fn upload(&mut self, uploads: &[Upload<'_>]) -> Result<(), GpuError> {
-        // A call that failed before it was submitted leaves copies behind.
-        self.copies = None;
-        let (mut encoder, mut lists) = (self.device.encoder(), Vec::new());
+    /// Makes the buffers of lists, and sends the lists. Returns their bytes.
+    pub(super) fn upload(&mut self, uploads: &[Upload<'_>]) -> Result<u64, GpuError> {
+        let mut encoder = self.device.encoder();
         for upload in uploads {
             // Kernels bind it even if it is empty.
             self.ensure(upload.buffer, upload.len())?;
-            if upload.len() == 0 {
-                continue;
+            if upload.len() > 0 {
+                let staging = self.stage(upload)?;
+                encoder.copy_buffer_to_buffer(&staging, 0, self.get(upload.buffer), 0, upload.len());
             }
-            let staging = self.stage(upload)?;
-            encoder.copy_buffer_to_buffer(&staging, 0, self.get(upload.buffer), 0, upload.len());
-            self.bytes_sent += upload.len();
-            lists.push(upload.buffer);
         }
-        self.copies = Some((encoder, lists));
-        Ok(())
+        self.device.submit(encoder);
+        uploads.iter().filter(|upload| upload.len() > 0).for_each(|upload| self.take_staging_back(upload));
+        Ok(uploads.iter().map(Upload::len).sum())
     }
 
     /// Writes a list into its staging buffer: each thread writes pieces of it straight into mapped memory.
@@ -245,15 +233,13 @@ impl Storage {
         Ok(kept.buffer.clone())
     }
 
-    /// Asks for the staging buffers of lists back once the device has made its copies: the wait for the submission maps them.
-    pub(super) fn take_staging_back(&self, lists: &[Buffer]) {
-        for list in lists {
-            let kept = &self.buffers[&BufferId::UploadStaging(*list)];
-            let is_mapped = kept.is_mapped.clone();
-            kept.buffer.map_async(wgpu::MapMode::Write, .., move |result| {
-                is_mapped.store(result.is_ok(), Ordering::Release);
-            });
-        }
+    /// Asks for the staging buffer of a list back once the device has made its copy: a later wait maps it.
+    fn take_staging_back(&self, upload: &Upload<'_>) {
+        let kept = &self.buffers[&BufferId::UploadStaging(upload.buffer)];
+        let is_mapped = kept.is_mapped.clone();
+        kept.buffer.map_async(wgpu::MapMode::Write, .., move |result| {
+            is_mapped.store(result.is_ok(), Ordering::Release);
+        });
     }
 
     pub(super) fn bind_group(
@@ -278,16 +264,15 @@ impl Storage {
         made
     }
 
-    /// Notes the end of a call. Once in a window frees buffers that were hardly used, and returns true.
-    pub(super) fn end_call(&mut self) -> bool {
+    /// Notes the end of a call. Once in a window frees buffers that were hardly used.
+    pub(super) fn end_call(&mut self) {
         self.calls += 1;
         if self.calls < CALLS_PER_WINDOW {
-            return false;
+            return;
         }
         self.calls = 0;
         self.buffers.retain(|_, kept| kept.buffer.size() <= (4 * kept.used).max(ALWAYS_KEPT_BYTES));
         self.buffers.values_mut().for_each(|kept| kept.used = 0);
         self.bind_groups.clear();
-        true
     }
 }

@@ -1,27 +1,19 @@
-//! Words of a device, and saved bytes, that may be anything: an error, or pairs as they may be; never a panic.
+//! Pairs of a device, and saved bytes, that may be anything: an error, or pairs as they may be; never a panic.
 
-use pbig_core::{Aabb, BoxIds, BroadPhase, PairList, ProxyFilter};
-use pbig_gpu::decode;
+use pbig_core::{Aabb, BoxIds, BroadPhase, Pair, PairList, ProxyFilter};
 
-/// A byte for the format, one for the number of boxes, one for that of entries; then words, entries first.
+/// A byte that chooses, and one for the number of boxes; then pairs, or a snapshot.
 pub fn decode_words(data: &[u8]) {
-    let [format, boxes, entries, rest @ ..] = data else { return };
-    let words: Vec<u32> = rest.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
-    let (entries, output) = words.split_at(words.len().min(usize::from(*entries)));
-    let boxes = if format & 4 == 0 { u32::from(*boxes) } else { u32::MAX - u32::from(*boxes) };
-    let (mut pairs, ids) = (PairList::default(), BoxIds::First(boxes));
-    let found = match format & 3 {
-        0 => decode::plain(output, ids, format & 16 != 0, &mut pairs),
-        1 => decode::records(output, entries, ids, &mut pairs),
-        2 => decode::bits(output, ids, &mut pairs),
-        _ => return snapshot(rest),
-    };
-    if found.is_err() {
-        return;
+    let [format, boxes, rest @ ..] = data else { return };
+    if format & 3 == 3 {
+        return snapshot(rest);
     }
-    assert!(pairs.iter().all(|pair| pair.a < pair.b && pair.b < boxes), "no pairs of {boxes} boxes");
-    // A row takes a byte for each partner, a bit is one pair.
-    assert!(pairs.len() <= 32 * output.len(), "{} pairs of {} words", pairs.len(), output.len());
+    let boxes = if format & 4 == 0 { u32::from(*boxes) } else { u32::MAX - u32::from(*boxes) };
+    let given: Vec<Pair> = rest.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect();
+    let are_right = given.iter().all(|pair| pair.a < pair.b && pair.b < boxes);
+    let mut pairs = PairList::default();
+    assert_eq!(pairs.append_checked(&given, BoxIds::First(boxes)).is_ok(), are_right);
+    assert_eq!(*pairs, if are_right { &given[..] } else { &[] });
 }
 
 /// A restored broad phase goes on without a panic.

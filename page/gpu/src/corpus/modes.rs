@@ -1,7 +1,7 @@
 //! The modes of a search for all pairs.
 
 use pbig_core::{Aabb, DeviceFound, Pair, ProxyFilter, SearchRequest, oracle};
-use pbig_gpu::{Coding, GpuFinder, GpuOptions};
+use pbig_gpu::{GpuFinder, GpuOptions};
 use pbig_harness::corpus::difference;
 
 /// A way of the device to find pairs.
@@ -10,7 +10,6 @@ pub(super) struct Mode {
     pub(super) name: &'static str,
     /// Maximum number of boxes that the mode can take, or can take in seconds.
     pub(super) most_boxes: usize,
-    coding: Coding,
     /// The caller wants the pairs in order.
     is_sorted: bool,
     /// They come in order. Otherwise that is left to the core.
@@ -23,7 +22,6 @@ pub(super) struct Mode {
 const PLAIN: Mode = Mode {
     name: "plain",
     most_boxes: usize::MAX,
-    coding: Coding::Plain,
     is_sorted: false,
     comes_sorted: false,
     has_grid: true,
@@ -33,10 +31,8 @@ const PLAIN: Mode = Mode {
 /// Every mode.
 pub(super) const MODES: &[Mode] = &[
     PLAIN,
-    Mode { name: "sorted", is_sorted: true, comes_sorted: true, coding: Coding::Auto, ..PLAIN },
-    Mode { name: "records", coding: Coding::Packed, ..PLAIN },
-    Mode { name: "bits", coding: Coding::Packed, has_grid: false, most_boxes: 1024, ..PLAIN },
-    Mode { name: "all pairs, sorted", is_sorted: true, has_grid: false, most_boxes: 1024, ..PLAIN },
+    Mode { name: "sorted", is_sorted: true, comes_sorted: true, ..PLAIN },
+    Mode { name: "all pairs", has_grid: false, most_boxes: 1024, ..PLAIN },
     Mode { name: "chunks", chunk: [20, 3], most_boxes: 300, ..PLAIN },
     Mode { name: "sorted chunks", is_sorted: true, chunk: [20, 3], most_boxes: 300, ..PLAIN },
 ];
@@ -44,7 +40,7 @@ pub(super) const MODES: &[Mode] = &[
 impl Mode {
     pub(super) fn options(&self) -> GpuOptions {
         let all_pairs_up_to = if self.has_grid { 0 } else { 1024 };
-        GpuOptions { coding: self.coding, chunk: self.chunk, all_pairs_up_to, ..GpuOptions::DEFAULT }
+        GpuOptions { chunk: self.chunk, all_pairs_up_to, ..GpuOptions::DEFAULT }
     }
 }
 

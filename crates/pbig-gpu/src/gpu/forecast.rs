@@ -1,0 +1,76 @@
+//! The forecast of a call, from the counts of earlier ones: its plan, and the lengths of its lists. A wrong plan costs time, a wrong
+//! length a repetition.
+
+use super::GpuError;
+use super::kept_plan::KeptPlan;
+use super::passes;
+use super::storage::Storage;
+use crate::GpuOptions;
+use crate::layout::{COUNTED, Counters, FILTERED, LANES, Params, Totals, UNPLANNED};
+use crate::policy::WIDEST_ITEM;
+use pbig_shaders::Buffer;
+
+/// Number of boxes by which lists of the first call are longer than for the boxes there are: few boxes may need many entries.
+const EXTRA_BOXES: u64 = 4096;
+
+/// The plan and the lengths that earlier calls have told.
+#[derive(Debug)]
+pub(super) struct Forecast {
+    pub(super) plan: Option<KeptPlan>,
+    /// Factor on the cells of a new plan: below 1 if the last plan made too many tests for the boxes that it was made for.
+    pub(super) cell_factor: f32,
+    /// Lengths of the lists of the last map.
+    pub(super) lists: Counters,
+    /// Words of pairs of the last call.
+    pub(super) words: u64,
+}
+
+impl Forecast {
+    pub(super) fn new() -> Self {
+        Self { plan: None, cell_factor: 1.0, lists: Counters::default(), words: 0 }
+    }
+
+    /// Makes the buffers of a call, and returns its parameters. Without a plan, only few boxes are searched.
+    pub(super) fn params(
+        &self,
+        storage: &mut Storage,
+        options: &GpuOptions,
+        boxes: u32,
+        has_filters: bool,
+    ) -> Result<Params, GpuError> {
+        let mut params = ungridded(storage, options, boxes, has_filters);
+        let first_bytes = options.first_bytes * (u64::from(boxes) + EXTRA_BOXES);
+        let first_bytes = first_bytes.min(storage.max_buffer_bytes);
+        match &self.plan {
+            _ if !needs_grid(options, boxes) => {}
+            None => params.flags |= UNPLANNED,
+            Some(kept) => {
+                kept.check_entries(boxes)?;
+                params = kept.plan.add_to(params);
+                params.most_tests = kept.most_tests(boxes, options.boxes_per_cell);
+                passes::make_buffers(storage, &mut params, &self.lists, first_bytes)?;
+            }
+        }
+        storage.ensure(Buffer::Counters, size_of::<Counters>() as u64)?;
+        storage.ensure(Buffer::Totals, size_of::<Totals>() as u64)?;
+        storage.ensure(Buffer::Out, (4 * self.words).max(first_bytes))?;
+        Ok(params)
+    }
+}
+
+/// Returns true if not every pair is tested.
+pub(super) fn needs_grid(options: &GpuOptions, boxes: u32) -> bool {
+    boxes > options.all_pairs_up_to.max(1)
+}
+
+/// Returns the parameters of a call, without grid and capacities.
+fn ungridded(storage: &Storage, options: &GpuOptions, boxes: u32, has_filters: bool) -> Params {
+    Params {
+        boxes,
+        small_cell: options.small_cell.clamp(1, LANES),
+        // The output of a work item must fit the smallest buffer.
+        columns: if storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
+        flags: FILTERED * u32::from(has_filters) + COUNTED * u32::from(options.count_tests),
+        ..Params::default()
+    }
+}
