@@ -34,7 +34,7 @@ fn panic(_: &wgpu::Device) {
 
 fn refuse(device: &wgpu::Device) {
     let source = wgpu::ShaderSource::Wgsl("this is no WGSL".into());
-    device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
+    _ = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
 }
 
 /// Returns a device that fails at the wait after this number of waits.

@@ -1,26 +1,9 @@
 //! The choice of an adapter.
 
-use super::{GpuError, wait};
-
-/// Returns all adapters, best first: discrete, integrated, virtual, unknown, software.
-///
-/// None in a browser, where nothing may block. `WGPU_BACKEND` and wgpu's other variables apply. With `WGPU_POWER_PREF=low` integrated adapters come first.
-pub fn adapters() -> Vec<wgpu::Adapter> {
-    wait::block_on(async { Ok::<_, GpuError>(best_first().await) }).unwrap_or_default()
-}
-
-/// Returns the adapter whose name contains `name`, in any case; without a name the one that [`GpuFinder::new`] uses.
-///
-/// # Errors
-/// As [`GpuFinder::new`], if there is no such adapter.
-///
-/// [`GpuFinder::new`]: super::GpuFinder::new
-pub fn adapter(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
-    wait::block_on(choose(name))
-}
+use super::GpuError;
 
 /// Returns all adapters, best first. Of several a browser shows one.
-async fn best_first() -> Vec<wgpu::Adapter> {
+pub(super) async fn best_first() -> Vec<wgpu::Adapter> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let backends = wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all());
     let mut adapters = instance.enumerate_adapters(backends).await;

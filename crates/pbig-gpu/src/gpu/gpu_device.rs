@@ -1,6 +1,6 @@
 //! The device: pipelines, buffers, submissions. Only this file and `readback` talk to a queue.
 
-use super::{GpuError, adapter, wait};
+use super::{GpuError, adapter};
 use crate::GpuOptions;
 use pbig_shaders::{Buffer, KERNELS, Kernel, SCAN_BLOCKS, SCAN_SUMS};
 use std::collections::HashMap;
@@ -120,35 +120,6 @@ impl GpuDevice {
         most.min(options.max_bytes.max(1 << 20)) / 256 * 256
     }
 
-    /// Runs `work`, and returns errors that wgpu reports meanwhile.
-    pub(super) async fn watch<T, F: From<GpuError>>(
-        &self,
-        work: impl AsyncFnOnce() -> Result<T, F>,
-    ) -> Result<T, F> {
-        use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
-        let _entered = wait::enter(self)?;
-        // Three variables, because a future that is dropped must end the innermost scope first.
-        let outer = self.handle.push_error_scope(Validation);
-        let middle = self.handle.push_error_scope(OutOfMemory);
-        let inner = self.handle.push_error_scope(Internal);
-        let result = work().await;
-        // All at once: in a page each is a message to another process and its answer.
-        let popped = [inner.pop(), middle.pop(), outer.pop()];
-        let mut first = None;
-        for error in popped {
-            first = first.or(error.await);
-        }
-        let Some(error) = first else { return result };
-        // A pipeline may be what was refused.
-        lock(&self.pipelines).clear();
-        match error {
-            wgpu::Error::OutOfMemory { .. } => Err(GpuError::OutOfMemory.into()),
-            // A lost device refuses everything, and its messages do not name the loss.
-            _ if !self.is_alive() => Err(self.give_up().into()),
-            other => Err(GpuError::Refused(first_lines(&other.to_string())).into()),
-        }
-    }
-
     /// Compiles all kernels.
     pub(super) fn compile_all(&self, options: &GpuOptions) {
         let variant = Variant::new(options);
@@ -190,6 +161,11 @@ impl GpuDevice {
         })
     }
 
+    /// Forgets all pipelines: one may be what was refused.
+    pub(super) fn forget_pipelines(&self) {
+        lock(&self.pipelines).clear();
+    }
+
     /// Returns the number of pipelines.
     pub(super) fn pipelines(&self) -> usize {
         lock(&self.pipelines).len()
@@ -201,10 +177,10 @@ impl GpuDevice {
         size: u64,
         usage: wgpu::BufferUsages,
         mapped_at_creation: bool,
-    ) -> Result<wgpu::Buffer, GpuError> {
+    ) -> wgpu::Buffer {
         self.buffers_made.fetch_add(1, Ordering::Relaxed);
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation };
-        Ok(self.handle.create_buffer(&descriptor))
+        self.handle.create_buffer(&descriptor)
     }
 
     pub(super) fn encoder(&self) -> wgpu::CommandEncoder {
@@ -229,10 +205,6 @@ impl GpuDevice {
 /// Locks a mutex even if another thread panicked while it held the lock: these mutexes guard caches only.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn first_lines(text: &str) -> String {
-    text.lines().map(str::trim).filter(|line| !line.is_empty()).take(3).collect::<Vec<_>>().join(": ")
 }
 
 /// Returns an error if the device lacks what every WebGPU device has.

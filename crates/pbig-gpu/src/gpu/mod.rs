@@ -15,6 +15,7 @@ mod passes;
 mod readback;
 mod reports;
 mod resident;
+mod search;
 mod session;
 mod storage;
 pub mod testing;
@@ -22,8 +23,9 @@ mod ticks;
 mod timer;
 #[cfg_attr(target_arch = "wasm32", path = "wait_web.rs")]
 mod wait;
+mod watch;
 
-pub use adapter::{adapter, adapters, describe};
+pub use adapter::describe;
 use error::Failure;
 pub use error::GpuError;
 use gpu_plan::GpuPlan;
@@ -38,6 +40,21 @@ use resident::Resident;
 use session::Session;
 use std::sync::Arc;
 use std::time::Duration;
+
+/// Returns all adapters, best first: discrete, integrated, virtual, unknown, software.
+///
+/// None in a browser, where nothing may block. `WGPU_BACKEND` and wgpu's other variables apply. With `WGPU_POWER_PREF=low` integrated adapters come first.
+pub fn adapters() -> Vec<wgpu::Adapter> {
+    wait::block_on(async { Ok::<_, GpuError>(adapter::best_first().await) }).unwrap_or_default()
+}
+
+/// Returns the adapter whose name contains `name`, in any case; without a name the one that [`GpuFinder::new`] uses.
+///
+/// # Errors
+/// As [`GpuFinder::new`], if there is no such adapter.
+pub fn adapter(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
+    wait::block_on(adapter::choose(name))
+}
 
 /// Time that a call waits for a device of the app that was busy for too long.
 const PROBE: Duration = Duration::from_millis(10);
@@ -289,7 +306,7 @@ impl GpuFinder {
         let device = self.open_device().await?;
         match self.session.take().filter(|session| session.options == self.options) {
             Some(session) => Ok(session),
-            None => device.watch(async || Session::new(device.clone(), &self.options)).await,
+            None => device.watch(async || Ok(Session::new(device.clone(), &self.options))).await,
         }
     }
 

@@ -1,6 +1,5 @@
 //! The counts of calls that nobody waits for: each call copies them into a small buffer, which a later call reads when it is mapped.
 
-use super::GpuError;
 use super::gpu_device::GpuDevice;
 use super::readback::{Counts, Mapped};
 use crate::layout::SUMMARY_WORDS;
@@ -48,10 +47,10 @@ pub(super) struct Reports {
 }
 
 impl Slot {
-    fn new(device: &GpuDevice) -> Result<Self, GpuError> {
+    fn new(device: &GpuDevice) -> Self {
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        let staging = device.buffer("report", REPORT_BYTES, usage, false)?;
-        Ok(Self { staging, state: Arc::new(AtomicU8::new(FREE)), has_summary: false, boxes: 0, plan: 0 })
+        let staging = device.buffer("report", REPORT_BYTES, usage, false);
+        Self { staging, state: Arc::new(AtomicU8::new(FREE)), has_summary: false, boxes: 0, plan: 0 }
     }
 
     fn is_free(&self) -> bool {
@@ -91,8 +90,8 @@ impl Reports {
         encoder: &mut wgpu::CommandEncoder,
         (counters, totals, summary): (&wgpu::Buffer, &wgpu::Buffer, Option<&wgpu::Buffer>),
         (boxes, plan): (u32, u32),
-    ) -> Result<(), GpuError> {
-        let Some(slot) = self.free(device)? else { return Ok(()) };
+    ) {
+        let Some(slot) = self.free(device) else { return };
         (slot.has_summary, slot.boxes, slot.plan) = (summary.is_some(), boxes, plan);
         Counts::copy(encoder, [counters, totals, &slot.staging]);
         if let Some(summary) = summary {
@@ -103,14 +102,13 @@ impl Reports {
         encoder.map_buffer_on_submit(&slot.staging, wgpu::MapMode::Read, .., move |result| {
             state.store(if result.is_ok() { MAPPED } else { FREE }, Ordering::Release);
         });
-        Ok(())
     }
 
     /// Returns a buffer that the device does not use, or none if too many are on their way.
-    fn free(&mut self, device: &GpuDevice) -> Result<Option<&mut Slot>, GpuError> {
+    fn free(&mut self, device: &GpuDevice) -> Option<&mut Slot> {
         while self.slots.len() < MOST_REPORTS {
-            self.slots.push(Slot::new(device)?);
+            self.slots.push(Slot::new(device));
         }
-        Ok(self.slots.iter_mut().find(|slot| slot.is_free()))
+        self.slots.iter_mut().find(|slot| slot.is_free())
     }
 }

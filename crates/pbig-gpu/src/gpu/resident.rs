@@ -97,7 +97,7 @@ impl Resident {
         let params = prepared?;
         self.copy_boxes(encoder, boxes);
         self.record_steps(encoder, &params);
-        self.record_report(encoder, &params)?;
+        self.record_report(encoder, &params);
         let [pairs, count] = [Buffer::Out, Buffer::PairCount].map(|id| self.storage.get(id).clone());
         self.storage.end_call();
         Ok(DevicePairs { pairs, count })
@@ -234,7 +234,7 @@ impl Resident {
     }
 
     /// Lets the counts come home, where a later call finds them.
-    fn record_report(&mut self, encoder: &mut wgpu::CommandEncoder, params: &Params) -> Result<(), GpuError> {
+    fn record_report(&mut self, encoder: &mut wgpu::CommandEncoder, params: &Params) {
         let summary = self.measures(params).then(|| self.storage.get(Buffer::Summary));
         let [counters, totals] = [Buffer::Counters, Buffer::Totals].map(|id| self.storage.get(id));
         self.reports.record(
@@ -242,7 +242,7 @@ impl Resident {
             encoder,
             (counters, totals, summary),
             (params.boxes, self.plans),
-        )
+        );
     }
 }
 

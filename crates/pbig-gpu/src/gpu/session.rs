@@ -1,25 +1,22 @@
-//! A search whose boxes come from the host and whose pairs go there. One wait tells the counts, another one brings the pairs, unless they
-//! are few. Lists that did not fit are made longer, and the search is repeated.
+//! The state of a finder on a device, and what goes there and comes back.
 
-use super::GpuError;
-use super::error::Failure;
-use super::forecast::{Forecast, needs_grid};
+use super::forecast::Forecast;
 use super::gpu_device::{GpuDevice, Variant};
-use super::items::{cut, rest};
-use super::kept_plan::{FINER_RETRY, KeptPlan};
-use super::passes::{self, MOST_RANKED, Recording, Step, pair_count};
-use super::readback::Counts;
-use super::storage::{Storage, Upload};
+use super::passes::{Recording, Step};
+use super::readback::{Counts, Fetch, Mapped};
+use super::storage::{BufferId, Storage};
 use super::timer::Timer;
+use super::{GpuError, wait};
 use crate::GpuOptions;
-use crate::layout::{Chunk, Counters, LANES, Params, halves, wide};
+use crate::layout::{Chunk, Params, halves};
+use pbig_core::DeviceFound;
 use pbig_core::internal::Clock;
-use pbig_core::{Aabb, DeviceFound, Pair, PairList, SearchRequest};
-use pbig_shaders::Buffer;
+use pbig_shaders::{Buffer, Stage};
+use std::ops::Range;
 use std::sync::Arc;
 
-/// Maximum number of repetitions. Each one has the room that the last one asked for.
-const MAX_REPEATS: u32 = 8;
+/// Bytes of pairs that may come with the counts. Few pairs then take one wait. A call reads at most 4 kB more than its pairs.
+const PREFETCHED_BYTES: u64 = 3072;
 
 /// The state of a finder on a device, kept from call to call.
 #[derive(Debug)]
@@ -31,7 +28,8 @@ pub(super) struct Session {
     pub(super) forecast: Forecast,
     /// Parameters of this call.
     pub(super) params: Params,
-    max_pairs: u64,
+    /// Maximum number of pairs.
+    pub(super) max_pairs: u64,
     /// Pairs and report of this call.
     pub(super) found: DeviceFound,
     /// Words of pairs that came with the counts.
@@ -41,11 +39,11 @@ pub(super) struct Session {
 }
 
 impl Session {
-    pub(super) fn new(device: Arc<GpuDevice>, options: &GpuOptions) -> Result<Self, GpuError> {
-        Ok(Self {
+    pub(super) fn new(device: Arc<GpuDevice>, options: &GpuOptions) -> Self {
+        Self {
             options: *options,
             storage: Storage::new(device.clone(), options),
-            timer: Timer::new(&device, options)?,
+            timer: Timer::new(&device, options),
             forecast: Forecast::new(),
             params: Params::default(),
             max_pairs: 0,
@@ -53,223 +51,96 @@ impl Session {
             prefetched: Vec::new(),
             submissions: 0,
             device,
-        })
-    }
-
-    /// Finds all pairs. The result uses the memory of `pairs`.
-    pub(super) async fn search(
-        &mut self,
-        request: &SearchRequest<'_>,
-        mut pairs: PairList,
-    ) -> Result<DeviceFound, Failure> {
-        pairs.clear();
-        self.found = DeviceFound::default();
-        (self.found.pairs, self.max_pairs, self.submissions) = (pairs, request.max_pairs, 0);
-        self.timer.iter_mut().for_each(Timer::start);
-        if request.boxes.len() < 2 {
-            self.found.valid = count_valid(request.boxes);
-            return Ok(std::mem::take(&mut self.found));
         }
-        self.upload(request)?;
-        let counts = self.count(request).await?;
-        self.note(request, &counts);
-        self.take_pairs(wide(counts.totals.words), request.is_sorted).await?;
-        self.take_times().await?;
-        self.storage.end_call();
-        Ok(std::mem::take(&mut self.found))
-    }
-
-    /// Uploads all boxes: to find those that moved, the host would have to read a copy of the last call's, too.
-    fn upload(&mut self, request: &SearchRequest<'_>) -> Result<(), GpuError> {
-        let mut clock = Clock::start();
-        let (count, limit) = (request.boxes.len() as u64, self.storage.max_boxes());
-        if count > limit {
-            let [bytes, limit] = [count, limit].map(|boxes| boxes * size_of::<Aabb>() as u64);
-            return Err(GpuError::TooLarge { what: "boxes", bytes, limit });
-        }
-        let boxes = Upload::new(Buffer::Boxes, request.boxes);
-        let filters = Upload::new(Buffer::Filters, request.filters.unwrap_or(&[]));
-        self.found.report.uploaded = self.storage.upload(&[boxes, filters])?;
-        self.submissions += 1;
-        self.found.report.upload = clock.lap();
-        Ok(())
-    }
-
-    /// Checks all pairs, again with more room if lists or pairs did not fit. Returns the counts.
-    async fn count(&mut self, request: &SearchRequest<'_>) -> Result<Counts, Failure> {
-        self.forecast.cell_factor = 1.0;
-        // A plan that no search has used was made for the boxes of a call without an answer.
-        self.forecast.plan.take_if(|kept| kept.is_new());
-        let boxes = request.boxes.len() as u32;
-        for _ in 0..MAX_REPEATS {
-            self.plan(request.boxes);
-            let (storage, options) = (&mut self.storage, &self.options);
-            self.params = self.forecast.params(storage, options, boxes, request.filters.is_some())?;
-            let counts = self.check().await?;
-            if self.accepts(&counts)? {
-                return Ok(counts);
-            }
-            self.found.report.repeats += 1;
-        }
-        Err(GpuError::Refused("counts that contradict each other".into()).into())
-    }
-
-    /// Makes a plan if the boxes need one, and there is none or one for many more or fewer boxes.
-    fn plan(&mut self, boxes: &[Aabb]) {
-        let forecast = &mut self.forecast;
-        forecast.plan.take_if(|kept| !kept.suits(boxes.len()));
-        if forecast.plan.is_none() && needs_grid(&self.options, boxes.len() as u32) {
-            let mut clock = Clock::start();
-            let settings = (&self.options, forecast.cell_factor);
-            forecast.plan = Some(KeptPlan::new(boxes, settings, self.storage.max_buffer_bytes));
-            self.found.report.plan += clock.lap();
-        }
-    }
-
-    /// Sorts the boxes into cells, and checks their work items, a chunk in each submission. Returns the counts.
-    async fn check(&mut self) -> Result<Counts, GpuError> {
-        self.found.report.chunks = 1;
-        if self.params.levels == 0 {
-            self.submit(Chunk::default(), &passes::check_all(&self.params))?;
-            return self.counts().await;
-        }
-        let [small_items, large_items] = self.chunk_items();
-        let first = Chunk { small_items, large_items, ..Chunk::default() };
-        self.submit(first, &passes::map_and_check(&self.params))?;
-        let counts = self.counts().await?;
-        let others = cut(rest(&counts.counters, &first), self.chunk_items());
-        if others.is_empty() || !passes::fits(&self.params, &counts.counters) {
-            return Ok(counts);
-        }
-        for chunk in &others {
-            self.submit(*chunk, &passes::check(chunk))?;
-        }
-        self.found.report.chunks += others.len() as u32;
-        self.counts().await
-    }
-
-    /// Returns the numbers of small and of large work items of a chunk. A software adapter gets fewer, so that it answers in time.
-    fn chunk_items(&self) -> [u32; 2] {
-        let share = if self.device.is_software { 4 } else { 1 };
-        self.options.chunk.map(|items| (items / share).max(1))
-    }
-
-    /// Notes the lengths that a check needed. Returns false if it had less room.
-    fn accepts(&mut self, counts: &Counts) -> Result<bool, Failure> {
-        let Counts { counters, totals } = counts;
-        if self.params.levels > 0 {
-            self.forecast.lists = *counters;
-            // First: lists that a plan for other boxes makes are not worth their memory.
-            if !passes::tests_fit(&self.params, counters) {
-                return self.replan().map(|()| false);
-            }
-            if !passes::lists_fit(&self.params, counters) {
-                return Ok(false);
-            }
-        }
-        let words = wide(totals.words);
-        if words / 2 > self.max_pairs {
-            return Err(Failure::TooManyPairs);
-        }
-        self.forecast.words = words;
-        Ok(words <= self.storage.size(Buffer::Out) / 4)
-    }
-
-    /// Gives up a plan that makes too many tests: it may have been made for other boxes. One that was made for these is tried once
-    /// more, with finer cells: a few boxes far away leave too large ones.
-    ///
-    /// # Errors
-    /// If that is done: the call is declined.
-    fn replan(&mut self) -> Result<(), Failure> {
-        let forecast = &mut self.forecast;
-        let was_new = forecast.plan.take().is_some_and(|kept| kept.is_new());
-        let Counters { tests, too_many_tests, .. } = std::mem::take(&mut forecast.lists);
-        if !was_new {
-            return Ok(());
-        }
-        if forecast.cell_factor > FINER_RETRY {
-            forecast.cell_factor = FINER_RETRY;
-            return Ok(());
-        }
-        let Params { boxes, most_tests, .. } = self.params;
-        let [tests, most] = [tests, most_tests].map(|tests| u64::from(LANES) * u64::from(tests));
-        // The number wraps around beyond 32 bits of workgroups.
-        let tests = if too_many_tests > 0 { "over 2^40".to_owned() } else { tests.to_string() };
-        Err(Failure::Declined(format!(
-            "the device declined {tests} tests of {boxes} boxes, more than {most}"
-        )))
-    }
-
-    /// Notes the grid, the tests and the memory of the call.
-    fn note(&mut self, request: &SearchRequest<'_>, counts: &Counts) {
-        let (found, Counts { counters, totals }) = (&mut self.found, counts);
-        found.report.device_bytes = self.storage.bytes();
-        if self.params.levels == 0 {
-            found.valid = count_valid(request.boxes);
-            found.checks.made = pair_count(self.params.boxes);
-        } else if let Some(kept) = &mut self.forecast.plan {
-            found.valid = counters.valid;
-            found.checks.made = u64::from(LANES) * u64::from(counters.tests);
-            found.plan = Some(kept.plan.to_string());
-            (found.report.cell, found.report.cells) = (kept.plan.cell, kept.plan.cells.into());
-            found.report.entries = counters.entries.into();
-            if kept.is_outgrown_after(counters) {
-                self.forecast.plan = None;
-            }
-        }
-        if self.options.count_tests {
-            let [made, redundant, overlaps] = [totals.made, totals.redundant, totals.overlaps].map(wide);
-            (found.checks.made, found.checks.redundant) = (made, redundant);
-            found.checks.unnecessary = made.saturating_sub(redundant + overlaps);
-        }
-    }
-
-    /// Takes the pairs of this number of words, in order if the caller wants it and the device can sort so many.
-    async fn take_pairs(&mut self, words: u64, is_sorted: bool) -> Result<(), Failure> {
-        if words <= self.prefetched.len() as u64 {
-            let mut pairs: Vec<Pair> = bytemuck::cast_slice(&self.prefetched[..words as usize]).to_vec();
-            pairs.sort_unstable();
-            return self.append(&pairs);
-        }
-        let is_sorted = is_sorted && self.params.levels > 0 && self.sort(words)?;
-        self.read_pairs(words).await?;
-        let is_out_of_order = is_sorted && !self.found.pairs.is_in_order();
-        if is_out_of_order { Err(GpuError::BadPairs("out of order".into()).into()) } else { Ok(()) }
-    }
-
-    /// Sorts the pairs of this number of words, a part of them in each submission. Returns false if there is no room for that.
-    fn sort(&mut self, words: u64) -> Result<bool, GpuError> {
-        let pairs = u32::try_from(words / 2).unwrap_or(u32::MAX);
-        match passes::make_sort_buffers(&mut self.storage, self.params.boxes, pairs) {
-            Err(GpuError::TooLarge { .. } | GpuError::OverBudget { .. }) => return Ok(false),
-            made => made?,
-        }
-        self.submit(Chunk::default(), &passes::group(self.params.boxes, pairs))?;
-        for first_pair in (0..pairs).step_by(MOST_RANKED as usize) {
-            let left = pairs - first_pair;
-            self.submit(Chunk { first_pair, ..Chunk::default() }, &passes::rank(left))?;
-        }
-        Ok(true)
     }
 
     /// Records and submits kernels that check these work items. Beyond the limits they count, and write no more.
-    fn submit(&mut self, items: Chunk, steps: &[Step]) -> Result<(), GpuError> {
+    pub(super) fn submit(&mut self, items: Chunk, steps: &[Step]) -> Result<(), GpuError> {
         let mut clock = Clock::start();
         let words = (self.storage.size(Buffer::Out) / 4).min(u64::from(u32::MAX) - 1);
         let chunk = Chunk { word_capacity: words as u32, pairs_left: halves(self.max_pairs), ..items };
         self.storage.write(Buffer::Params, &[self.params])?;
         self.storage.write(Buffer::Chunk, &[chunk])?;
         let mut encoder = self.device.encoder();
-        let (storage, variant) = (&mut self.storage, Variant::new(&self.options));
-        let (encoder_ref, timer) = (&mut encoder, self.timer.as_mut());
-        Recording { storage, encoder: encoder_ref, variant, timer }.record(steps);
+        let (storage, variant, timer) = (&mut self.storage, Variant::new(&self.options), self.timer.as_mut());
+        Recording { storage, encoder: &mut encoder, variant, timer }.record(steps);
         self.device.submit(encoder);
         self.submissions += 1;
         self.found.report.record += clock.lap();
         Ok(())
     }
-}
 
-fn count_valid(boxes: &[Aabb]) -> u32 {
-    boxes.iter().filter(|one| one.is_valid()).count() as u32
+    /// Waits for the counts of what was submitted, and prefetches the pairs if few are expected.
+    pub(super) async fn counts(&mut self) -> Result<Counts, GpuError> {
+        let is_short = 4 * self.forecast.words <= PREFETCHED_BYTES && self.found.report.waits == 0;
+        let room = PREFETCHED_BYTES.min(self.storage.size(Buffer::Out));
+        let pairs = if is_short { room } else { 0 };
+        let fetch =
+            self.fetch(BufferId::Staging(0), Counts::BYTES + pairs, |storage, encoder, staging| {
+                let [counters, totals] = [Buffer::Counters, Buffer::Totals].map(|id| storage.get(id));
+                Counts::copy(encoder, [counters, totals, staging]);
+                if pairs > 0 {
+                    encoder.copy_buffer_to_buffer(storage.get(Buffer::Out), 0, staging, Counts::BYTES, pairs);
+                }
+            })?;
+        let received = self.receive(fetch).await?;
+        let (counts, pairs) = received.split_at(Counts::BYTES as usize);
+        self.prefetched = bytemuck::pod_collect_to_vec(pairs);
+        Ok(bytemuck::pod_read_unaligned(counts))
+    }
+
+    /// Submits the copy of some bytes of pairs to a staging buffer.
+    pub(super) fn fetch_pairs(&mut self, range: Range<u64>, which: usize) -> Result<Fetch, GpuError> {
+        let bytes = range.end - range.start;
+        self.fetch(BufferId::Staging(which), bytes, |storage, encoder, staging| {
+            encoder.copy_buffer_to_buffer(storage.get(Buffer::Out), range.start, staging, 0, bytes);
+        })
+    }
+
+    /// Takes the times of the call's kernels, if they are wanted.
+    pub(super) async fn take_times(&mut self) -> Result<(), GpuError> {
+        let Some(timer) = self.timer.take() else { return Ok(()) };
+        let copy = |_: &_, encoder: &mut _, staging: &_| timer.resolve(encoder, staging);
+        let fetch = self.fetch(BufferId::Staging(0), timer.bytes(), copy)?;
+        let ticks: Vec<[u64; 2]> = bytemuck::pod_collect_to_vec(&self.receive(fetch).await?);
+        let timer = self.timer.insert(timer);
+        let report = &mut self.found.report;
+        for (kernel, time) in timer.take(&ticks, self.device.queue.get_timestamp_period()) {
+            match report.kernels.iter_mut().find(|(known, _)| *known == kernel.name) {
+                Some((_, sum)) => *sum += time,
+                None => report.kernels.push((kernel.name, time)),
+            }
+            report.map += if kernel.stage == Stage::Map { time } else { Default::default() };
+        }
+        Ok(())
+    }
+
+    /// Submits copies to a staging buffer of this number of bytes.
+    fn fetch(
+        &mut self,
+        staging: BufferId,
+        bytes: u64,
+        copy: impl FnOnce(&Storage, &mut wgpu::CommandEncoder, &wgpu::Buffer),
+    ) -> Result<Fetch, GpuError> {
+        self.storage.ensure(staging, bytes)?;
+        let mut encoder = self.device.encoder();
+        copy(&self.storage, &mut encoder, self.storage.get(staging));
+        self.found.report.downloaded += bytes;
+        self.submissions += 1;
+        Ok(Fetch { staging, bytes, submission: self.device.submit(encoder) })
+    }
+
+    /// Waits for copies. Returns the bytes where they lie.
+    pub(super) async fn receive(&mut self, fetch: Fetch) -> Result<Mapped, GpuError> {
+        let mut clock = Clock::start();
+        let Fetch { staging, bytes, submission } = fetch;
+        let patience = self.options.patience.saturating_mul(std::mem::take(&mut self.submissions).max(1));
+        let staging = self.storage.get(staging);
+        wait::map(&self.device, staging, bytes, submission, patience).await?;
+        let received = Mapped::new(&self.device, staging, bytes)?;
+        let report = &mut self.found.report;
+        report.wait += clock.lap();
+        report.waits += 1;
+        Ok(received)
+    }
 }

@@ -144,7 +144,7 @@ impl Storage {
         let size = (bytes + bytes / 4).min(limit).next_multiple_of(MIN_BUFFER_BYTES);
         self.check_total(id, size)?;
         let is_mapped = matches!(id, BufferId::UploadStaging(_));
-        let buffer = self.device.buffer(id.name(), size, id.usage(), is_mapped)?;
+        let buffer = self.device.buffer(id.name(), size, id.usage(), is_mapped);
         let is_mapped = Arc::new(AtomicBool::new(is_mapped));
         self.buffers.insert(id, KeptBuffer { buffer, used: bytes, is_mapped });
         Ok(())
@@ -181,7 +181,7 @@ impl Storage {
     /// Makes a uniform anew. Commands that were recorded keep the old one.
     pub(super) fn replace<T: Pod>(&mut self, uniform: Buffer, value: &T) -> Result<(), GpuError> {
         let (id, bytes) = (BufferId::from(uniform), bytemuck::bytes_of(value));
-        let buffer = self.device.buffer(id.name(), bytes.len() as u64, id.usage(), true)?;
+        let buffer = self.device.buffer(id.name(), bytes.len() as u64, id.usage(), true);
         let mut view = buffer.get_mapped_range_mut(..).map_err(|_| self.device.give_up())?;
         view.copy_from_slice(bytes);
         drop(view);

@@ -1,6 +1,5 @@
 //! Timestamps of the kernels of a call.
 
-use super::GpuError;
 use super::gpu_device::GpuDevice;
 use crate::GpuOptions;
 use pbig_shaders::Kernel;
@@ -19,15 +18,15 @@ pub(super) struct Timer {
 
 impl Timer {
     /// Makes a timer if times are wanted: some drivers allow about 32 query sets in all.
-    pub(super) fn new(device: &GpuDevice, options: &GpuOptions) -> Result<Option<Self>, GpuError> {
+    pub(super) fn new(device: &GpuDevice, options: &GpuOptions) -> Option<Self> {
         if !device.has_timestamps || !options.time_kernels {
-            return Ok(None);
+            return None;
         }
         let (label, ty, count) = (Some("times"), wgpu::QueryType::Timestamp, 2 * MOST_TIMED);
         let queries = device.handle.create_query_set(&wgpu::QuerySetDescriptor { label, ty, count });
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
-        let resolved = device.buffer("times", u64::from(count) * 8, usage, false)?;
-        Ok(Some(Self { queries, resolved, kernels: Vec::new() }))
+        let resolved = device.buffer("times", u64::from(count) * 8, usage, false);
+        Some(Self { queries, resolved, kernels: Vec::new() })
     }
 
     /// Forgets the kernels of a call that failed.

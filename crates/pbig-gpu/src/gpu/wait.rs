@@ -41,11 +41,6 @@ pub(super) async fn map(
 }
 
 impl GpuDevice {
-    /// Runs `work`, and returns errors that wgpu reports meanwhile.
-    pub(super) fn watch_now<T>(&self, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
-        block_on(self.watch(async || work()))
-    }
-
     /// Lets wgpu call back for what the device has done. wgpu panics if the driver reports a lost device.
     pub(super) fn poll_now(&self) {
         let poll = || self.handle.poll(wgpu::PollType::Poll);

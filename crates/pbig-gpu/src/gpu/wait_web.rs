@@ -55,11 +55,6 @@ pub(super) async fn map(
 }
 
 impl GpuDevice {
-    /// Runs `work`. The page is told of errors, and cannot wait for them.
-    pub(super) fn watch_now<T>(&self, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
-        work()
-    }
-
     /// Does nothing: the browser calls back.
     pub(super) fn poll_now(&self) {}
 

@@ -1,0 +1,252 @@
+//! A search whose boxes come from the host and whose pairs go there. One wait tells the counts, another one brings the pairs, unless they
+//! are few. Lists that did not fit are made longer, and the search is repeated.
+
+use super::GpuError;
+use super::error::Failure;
+use super::forecast::needs_grid;
+use super::items::{cut, rest};
+use super::kept_plan::{FINER_RETRY, KeptPlan};
+use super::passes::{self, MOST_RANKED, pair_count};
+use super::readback::Counts;
+use super::session::Session;
+use super::storage::Upload;
+use super::timer::Timer;
+use crate::layout::{Chunk, Counters, LANES, Params, wide};
+use pbig_core::internal::Clock;
+use pbig_core::{Aabb, BoxIds, DeviceFound, Pair, PairList, SearchRequest};
+use pbig_shaders::Buffer;
+
+/// Maximum number of repetitions. Each one has the room that the last one asked for.
+const MAX_REPEATS: u32 = 8;
+
+/// Bytes that the host reads at a time: while threads copy and check one piece, the next one comes.
+const PIECE_BYTES: u64 = 1 << 24;
+
+impl Session {
+    /// Finds all pairs. The result uses the memory of `pairs`.
+    pub(super) async fn search(
+        &mut self,
+        request: &SearchRequest<'_>,
+        mut pairs: PairList,
+    ) -> Result<DeviceFound, Failure> {
+        pairs.clear();
+        self.found = DeviceFound::default();
+        (self.found.pairs, self.max_pairs, self.submissions) = (pairs, request.max_pairs, 0);
+        self.timer.iter_mut().for_each(Timer::start);
+        if request.boxes.len() < 2 {
+            self.found.valid = count_valid(request.boxes);
+            return Ok(std::mem::take(&mut self.found));
+        }
+        self.upload(request)?;
+        let counts = self.count(request).await?;
+        self.note(request, &counts);
+        self.take_pairs(wide(counts.totals.words), request.is_sorted).await?;
+        self.take_times().await?;
+        self.storage.end_call();
+        Ok(std::mem::take(&mut self.found))
+    }
+
+    /// Uploads all boxes: to find those that moved, the host would have to read a copy of the last call's, too.
+    fn upload(&mut self, request: &SearchRequest<'_>) -> Result<(), GpuError> {
+        let mut clock = Clock::start();
+        let (count, limit) = (request.boxes.len() as u64, self.storage.max_boxes());
+        if count > limit {
+            let [bytes, limit] = [count, limit].map(|boxes| boxes * size_of::<Aabb>() as u64);
+            return Err(GpuError::TooLarge { what: "boxes", bytes, limit });
+        }
+        let boxes = Upload::new(Buffer::Boxes, request.boxes);
+        let filters = Upload::new(Buffer::Filters, request.filters.unwrap_or(&[]));
+        self.found.report.uploaded = self.storage.upload(&[boxes, filters])?;
+        self.submissions += 1;
+        self.found.report.upload = clock.lap();
+        Ok(())
+    }
+
+    /// Checks all pairs, again with more room if lists or pairs did not fit. Returns the counts.
+    async fn count(&mut self, request: &SearchRequest<'_>) -> Result<Counts, Failure> {
+        self.forecast.cell_factor = 1.0;
+        // A plan that no search has used was made for the boxes of a call without an answer.
+        self.forecast.plan.take_if(|kept| kept.is_new());
+        let boxes = request.boxes.len() as u32;
+        for _ in 0..MAX_REPEATS {
+            self.plan(request.boxes);
+            let (storage, options) = (&mut self.storage, &self.options);
+            self.params = self.forecast.params(storage, options, boxes, request.filters.is_some())?;
+            let counts = self.check().await?;
+            if self.accepts(&counts)? {
+                return Ok(counts);
+            }
+            self.found.report.repeats += 1;
+        }
+        Err(GpuError::Refused("counts that contradict each other".into()).into())
+    }
+
+    /// Makes a plan if the boxes need one, and there is none or one for many more or fewer boxes.
+    fn plan(&mut self, boxes: &[Aabb]) {
+        let forecast = &mut self.forecast;
+        forecast.plan.take_if(|kept| !kept.suits(boxes.len()));
+        if forecast.plan.is_none() && needs_grid(&self.options, boxes.len() as u32) {
+            let mut clock = Clock::start();
+            let settings = (&self.options, forecast.cell_factor);
+            forecast.plan = Some(KeptPlan::new(boxes, settings, self.storage.max_buffer_bytes));
+            self.found.report.plan += clock.lap();
+        }
+    }
+
+    /// Sorts the boxes into cells, and checks their work items, a chunk in each submission. Returns the counts.
+    async fn check(&mut self) -> Result<Counts, GpuError> {
+        self.found.report.chunks = 1;
+        if self.params.levels == 0 {
+            self.submit(Chunk::default(), &passes::check_all(&self.params))?;
+            return self.counts().await;
+        }
+        let [small_items, large_items] = self.chunk_items();
+        let first = Chunk { small_items, large_items, ..Chunk::default() };
+        self.submit(first, &passes::map_and_check(&self.params))?;
+        let counts = self.counts().await?;
+        let others = cut(rest(&counts.counters, &first), self.chunk_items());
+        if others.is_empty() || !passes::fits(&self.params, &counts.counters) {
+            return Ok(counts);
+        }
+        for chunk in &others {
+            self.submit(*chunk, &passes::check(chunk))?;
+        }
+        self.found.report.chunks += others.len() as u32;
+        self.counts().await
+    }
+
+    /// Returns the numbers of small and of large work items of a chunk. A software adapter gets fewer, so that it answers in time.
+    fn chunk_items(&self) -> [u32; 2] {
+        let share = if self.device.is_software { 4 } else { 1 };
+        self.options.chunk.map(|items| (items / share).max(1))
+    }
+
+    /// Notes the lengths that a check needed. Returns false if it had less room.
+    fn accepts(&mut self, counts: &Counts) -> Result<bool, Failure> {
+        let Counts { counters, totals } = counts;
+        if self.params.levels > 0 {
+            self.forecast.lists = *counters;
+            // First: lists that a plan for other boxes makes are not worth their memory.
+            if !passes::tests_fit(&self.params, counters) {
+                return self.replan().map(|()| false);
+            }
+            if !passes::lists_fit(&self.params, counters) {
+                return Ok(false);
+            }
+        }
+        let words = wide(totals.words);
+        if words / 2 > self.max_pairs {
+            return Err(Failure::TooManyPairs);
+        }
+        self.forecast.words = words;
+        Ok(words <= self.storage.size(Buffer::Out) / 4)
+    }
+
+    /// Gives up a plan that makes too many tests: it may have been made for other boxes. One that was made for these is tried once
+    /// more, with finer cells: a few boxes far away leave too large ones.
+    ///
+    /// # Errors
+    /// If that is done: the call is declined.
+    fn replan(&mut self) -> Result<(), Failure> {
+        let forecast = &mut self.forecast;
+        let was_new = forecast.plan.take().is_some_and(|kept| kept.is_new());
+        let Counters { tests, too_many_tests, .. } = std::mem::take(&mut forecast.lists);
+        if !was_new {
+            return Ok(());
+        }
+        if forecast.cell_factor > FINER_RETRY {
+            forecast.cell_factor = FINER_RETRY;
+            return Ok(());
+        }
+        let Params { boxes, most_tests, .. } = self.params;
+        let [tests, most] = [tests, most_tests].map(|tests| u64::from(LANES) * u64::from(tests));
+        // The number wraps around beyond 32 bits of workgroups.
+        let tests = if too_many_tests > 0 { "over 2^40".to_owned() } else { tests.to_string() };
+        Err(Failure::Declined(format!(
+            "the device declined {tests} tests of {boxes} boxes, more than {most}"
+        )))
+    }
+
+    /// Notes the grid, the tests and the memory of the call.
+    fn note(&mut self, request: &SearchRequest<'_>, counts: &Counts) {
+        let (found, Counts { counters, totals }) = (&mut self.found, counts);
+        found.report.device_bytes = self.storage.bytes();
+        if self.params.levels == 0 {
+            found.valid = count_valid(request.boxes);
+            found.checks.made = pair_count(self.params.boxes);
+        } else if let Some(kept) = &mut self.forecast.plan {
+            found.valid = counters.valid;
+            found.checks.made = u64::from(LANES) * u64::from(counters.tests);
+            found.plan = Some(kept.plan.to_string());
+            (found.report.cell, found.report.cells) = (kept.plan.cell, kept.plan.cells.into());
+            found.report.entries = counters.entries.into();
+            if kept.is_outgrown_after(counters) {
+                self.forecast.plan = None;
+            }
+        }
+        if self.options.count_tests {
+            let [made, redundant, overlaps] = [totals.made, totals.redundant, totals.overlaps].map(wide);
+            (found.checks.made, found.checks.redundant) = (made, redundant);
+            found.checks.unnecessary = made.saturating_sub(redundant + overlaps);
+        }
+    }
+
+    /// Takes the pairs of this number of words, in order if the caller wants it and the device can sort so many.
+    async fn take_pairs(&mut self, words: u64, is_sorted: bool) -> Result<(), Failure> {
+        if words <= self.prefetched.len() as u64 {
+            let mut pairs: Vec<Pair> = bytemuck::cast_slice(&self.prefetched[..words as usize]).to_vec();
+            pairs.sort_unstable();
+            return self.append(&pairs);
+        }
+        let is_sorted = is_sorted && self.params.levels > 0 && self.sort(words)?;
+        self.read_pairs(words).await?;
+        let is_out_of_order = is_sorted && !self.found.pairs.is_in_order();
+        if is_out_of_order { Err(GpuError::BadPairs("out of order".into()).into()) } else { Ok(()) }
+    }
+
+    /// Sorts the pairs of this number of words, a part of them in each submission. Returns false if there is no room for that.
+    fn sort(&mut self, words: u64) -> Result<bool, GpuError> {
+        let pairs = u32::try_from(words / 2).unwrap_or(u32::MAX);
+        match passes::make_sort_buffers(&mut self.storage, self.params.boxes, pairs) {
+            Err(GpuError::TooLarge { .. } | GpuError::OverBudget { .. }) => return Ok(false),
+            made => made?,
+        }
+        self.submit(Chunk::default(), &passes::group(self.params.boxes, pairs))?;
+        for first_pair in (0..pairs).step_by(MOST_RANKED as usize) {
+            let left = pairs - first_pair;
+            self.submit(Chunk { first_pair, ..Chunk::default() }, &passes::rank(left))?;
+        }
+        Ok(true)
+    }
+
+    /// Reads pairs of this number of words. With pipelining a piece comes while the one before is taken.
+    async fn read_pairs(&mut self, words: u64) -> Result<(), Failure> {
+        let most = if self.options.pipelining { PIECE_BYTES } else { u64::MAX };
+        let piece = self.storage.max_buffer_bytes.min(most) / 8 * 8;
+        let mut next = Some(self.fetch_pairs(0..(4 * words).min(piece), 0)?);
+        let mut from = piece;
+        while let Some(fetch) = next {
+            let range = from..(4 * words).min(from + piece);
+            let which = (from / piece) as usize % 2;
+            next = if range.is_empty() { None } else { Some(self.fetch_pairs(range, which)?) };
+            from += piece;
+            let received = self.receive(fetch).await?;
+            self.append(bytemuck::cast_slice(&received))?;
+        }
+        Ok(())
+    }
+
+    /// Copies pairs, and checks them on the way: the output of a device is untrusted input. Threads share the work.
+    fn append(&mut self, pairs: &[Pair]) -> Result<(), Failure> {
+        let mut clock = Clock::start();
+        let boxes = self.params.boxes;
+        let fault = |i| GpuError::BadPairs(format!("pair {i} of a piece is not a < b < {boxes}"));
+        self.found.pairs.append_checked(pairs, BoxIds::First(boxes)).map_err(fault)?;
+        self.found.report.decode += clock.lap();
+        Ok(())
+    }
+}
+
+fn count_valid(boxes: &[Aabb]) -> u32 {
+    boxes.iter().filter(|one| one.is_valid()).count() as u32
+}
