@@ -327,7 +327,9 @@ mod tests {
             let pairs = oracle::pairs(boxes).len() as f64;
             4.0 * record_words(boxes, &GpuOptions::DEFAULT) as f64 / pairs
         };
-        let crowd = bytes_a_pair(&cubes(1000, 1.0));
+        let site = |i: u32| [i % 2, i / 2 % 2, i / 4 % 2].map(|x| 100.0 * x as f32);
+        let crowd: Vec<_> = (0..8 * 300).map(|i| Aabb::from_center(site(i), [1.0; 3])).collect();
+        let crowd = bytes_a_pair(&crowd);
         assert!((1.0..1.1).contains(&crowd), "{crowd}");
         let couples: Vec<_> =
             (0..1000).map(|i| Aabb::from_center([(i / 2 * 4) as f32; 3], [1.0; 3])).collect();

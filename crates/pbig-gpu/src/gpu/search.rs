@@ -11,7 +11,7 @@ use super::readback::Counts;
 use super::session::Session;
 use super::storage::Upload;
 use super::timer::Timer;
-use crate::layout::{Chunk, Counters, LANES, Params, wide};
+use crate::layout::{Chunk, Counters, LANES, Params, Totals, wide};
 use pbig_core::internal::Clock;
 use pbig_core::{Aabb, BoxIds, DeviceFound, Pair, PairList, SearchRequest};
 use pbig_shaders::Buffer;
@@ -169,25 +169,31 @@ impl Session {
 
     /// Notes the grid, the tests and the memory of the call.
     fn note(&mut self, request: &SearchRequest<'_>, counts: &Counts) {
-        let (found, Counts { counters, totals }) = (&mut self.found, counts);
-        found.report.device_bytes = self.storage.bytes();
-        if self.params.levels == 0 {
-            found.valid = count_valid(request.boxes);
-            found.checks.made = pair_count(self.params.boxes);
-        } else if let Some(kept) = &mut self.forecast.plan {
-            found.valid = counters.valid;
-            found.checks.made = u64::from(LANES) * u64::from(counters.tests);
-            found.plan = Some(kept.plan.to_string());
-            (found.report.cell, found.report.cells) = (kept.plan.cell, kept.plan.cells.into());
-            found.report.entries = counters.entries.into();
-            if kept.is_outgrown_after(counters) {
-                self.forecast.plan = None;
-            }
+        self.found.report.device_bytes = self.storage.bytes();
+        if self.params.levels > 0 {
+            self.note_grid(&counts.counters);
+        } else {
+            self.found.valid = count_valid(request.boxes);
+            self.found.checks.made = pair_count(self.params.boxes);
         }
         if self.options.count_tests {
-            let [made, redundant, overlaps] = [totals.made, totals.redundant, totals.overlaps].map(wide);
-            (found.checks.made, found.checks.redundant) = (made, redundant);
-            found.checks.unnecessary = made.saturating_sub(redundant + overlaps);
+            let Totals { made, redundant, overlaps, .. } = counts.totals;
+            let checks = &mut self.found.checks;
+            (checks.made, checks.redundant) = (wide(made), wide(redundant));
+            checks.unnecessary = checks.made.saturating_sub(checks.redundant + wide(overlaps));
+        }
+    }
+
+    /// Notes the grid, and gives up its plan if the boxes have outgrown it.
+    fn note_grid(&mut self, counters: &Counters) {
+        let Some(kept) = &mut self.forecast.plan else { return };
+        let (found, plan) = (&mut self.found, &kept.plan);
+        (found.valid, found.plan) = (counters.valid, Some(plan.to_string()));
+        found.checks.made = u64::from(LANES) * u64::from(counters.tests);
+        (found.report.cell, found.report.cells) = (plan.cell, plan.cells.into());
+        found.report.entries = counters.entries.into();
+        if kept.is_outgrown_after(counters) {
+            self.forecast.plan = None;
         }
     }
 
