@@ -331,8 +331,8 @@ mod tests {
         let crowd: Vec<_> = (0..8 * 300).map(|i| Aabb::from_center(site(i), [1.0; 3])).collect();
         let crowd = bytes_a_pair(&crowd);
         assert!((1.0..1.1).contains(&crowd), "{crowd}");
-        let couples: Vec<_> =
-            (0..1000).map(|i| Aabb::from_center([(i / 2 * 4) as f32; 3], [1.0; 3])).collect();
+        let place = |i: u32| [i / 2 % 8, i / 16 % 8, i / 128].map(|x| 4.0 * x as f32);
+        let couples: Vec<_> = (0..1024).map(|i| Aabb::from_center(place(i), [1.0; 3])).collect();
         assert!(bytes_a_pair(&couples) > 8.0, "{}", bytes_a_pair(&couples));
     }
 
