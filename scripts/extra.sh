@@ -261,19 +261,20 @@ slowest() {
     [ "$1" = work_is_bounded ] && echo 300 || echo 60
 }
 
-# Seeds of the targets that read files are made from the box sets; the corpus stays in fuzz/corpus. What fails lies in fuzz/artifacts: move it to
+# Targets that read files begin with fuzz/seeds; the corpus stays in fuzz/corpus. What fails lies in fuzz/artifacts: move it to
 # fuzz/failed/TARGET, where the test suite runs it from then on.
 run_fuzz() {
-    local seconds=${1:-600} target words
+    local seconds=${1:-600} target words seeds
     shift || true
     [ $# -gt 0 ] || set -- finder_against_oracle between_against_oracle updates_against_scratch work_is_bounded decode \
         csv_reader npy_reader ply_reader obj_reader
-    step cargo run --release --example fuzz_seeds
     for target in "$@"; do
-        words=''
+        words='' seeds=''
+        mkdir -p "fuzz/corpus/$target"
+        [ ! -d "fuzz/seeds/$target" ] || seeds="fuzz/seeds/$target"
         [ ! -f "fuzz/$target.dict" ] || words="-dict=fuzz/$target.dict"
         # Inputs of every length from the beginning: by itself libFuzzer stays below 30 bytes for minutes.
-        step cargo +nightly fuzz run "$target" -- -len_control=0 -max_total_time="$seconds" -max_len="$(longest "$target")" \
+        step cargo +nightly fuzz run "$target" "fuzz/corpus/$target" $seeds -- -len_control=0 -max_total_time="$seconds" -max_len="$(longest "$target")" \
             -malloc_limit_mb=64 -timeout="$(slowest "$target")" -print_final_stats=1 $words
     done
 }

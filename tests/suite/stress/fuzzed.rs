@@ -1,7 +1,7 @@
-//! The checks of the fuzz targets, without instruments: on every input that once failed, and on random bytes.
+//! The checks of the fuzz targets, without instruments: on the seeds, every input that once failed, and random bytes.
 
-use super::memory;
 use pbig_harness::checks;
+use pbig_harness::counting::largest;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
@@ -26,21 +26,22 @@ fn assert_fits(largest: usize, input: &[u8]) {
 }
 
 #[test]
-fn inputs_that_once_failed() {
+fn seeds_and_inputs_that_once_failed() {
     let mut inputs = 0;
-    for (target, check) in TARGETS {
-        let folder = format!("{}/../fuzz/failed/{target}", env!("CARGO_MANIFEST_DIR"));
+    let all = ["seeds", "failed"].into_iter().flat_map(|kind| TARGETS.map(|target| (kind, target)));
+    for (kind, (target, check)) in all {
+        let folder = format!("{}/../fuzz/{kind}/{target}", env!("CARGO_MANIFEST_DIR"));
         for file in std::fs::read_dir(folder).into_iter().flatten() {
             let path = file.expect("a file").path();
             println!("{}", path.display());
             let bytes = std::fs::read(path).expect("readable");
-            memory::largest();
+            largest();
             check(&bytes);
-            assert_fits(memory::largest(), &bytes);
+            assert_fits(largest(), &bytes);
             inputs += 1;
         }
     }
-    assert!(inputs > 0, "fuzz/failed has none");
+    assert!(inputs >= 12, "{inputs} files below fuzz");
 }
 
 #[test]
@@ -53,11 +54,11 @@ fn random_bytes_on_every_target() {
             // Few different values: of 256 kinds of bytes few would name the same box or id twice.
             let kinds = [256, 48, 16][seed as usize % 3];
             let bytes: Vec<u8> = (0..length).map(|_| rng.random_range(0..kinds) as u8).collect();
-            memory::largest();
+            largest();
             check(&bytes);
             // A recipe is a world of two thousand boxes, however short.
             if target != "work_is_bounded" {
-                assert_fits(memory::largest(), &bytes);
+                assert_fits(largest(), &bytes);
             }
         }
     }
