@@ -93,20 +93,14 @@ fn compare(world: &World, both: &Both, random: &mut SmallRng, questions: usize) 
     hits
 }
 
-/// Compares the answers of one broad phase's index with those of rapier's own queries on the tree of another, which has the same
-/// boxes. Returns the number of rays that hit.
-pub(crate) fn compare_with_tree(
-    world: &World,
-    of_index: &PbigBroadPhase,
-    of_tree: &PbigBroadPhase,
-    seed: u64,
-) -> Result<u64, String> {
+/// Compares the answers of a broad phase's index with those of rapier's own queries on its tree. Returns the number of rays that
+/// hit.
+pub(crate) fn compare_with_tree(world: &World, pbig: &PbigBroadPhase, seed: u64) -> Result<u64, String> {
     let mut random = SmallRng::seed_from_u64(seed);
     let (at, along) = (random3(&mut random, 4.0), random3(&mut random, 1.0));
     let filter = QueryFilter::default();
-    let [ours, rapiers] = [of_index, of_tree]
-        .map(|one| one.as_query_pipeline(&DefaultQueryDispatcher, &world.bodies, &world.colliders, filter));
-    let (ours, wanted) = (ask!(&ours, at, along), ask!(&*rapiers, at, along));
+    let queries = pbig.as_query_pipeline(&DefaultQueryDispatcher, &world.bodies, &world.colliders, filter);
+    let (ours, wanted) = (ask!(&queries, at, along), ask!(&*queries, at, along));
     if ours == wanted {
         return Ok(u64::from(ours.ray.is_some()));
     }

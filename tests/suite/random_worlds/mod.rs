@@ -8,6 +8,7 @@ mod ops;
 mod subject;
 
 use crate::checked::{on_cpu, on_gpu, pbig};
+use crate::queries::compare_with_tree;
 use ops::{Act, Op, any_ops};
 use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
@@ -17,7 +18,7 @@ use rapier_pbig::shadow::Watcher;
 use rapier3d::prelude::*;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use subject::{Plant, Subject};
+use subject::Subject;
 
 /// Sums over all runs.
 #[derive(Clone, Copy, Debug, Default)]
@@ -98,11 +99,11 @@ struct RandomScene {
 }
 
 impl RandomScene {
-    fn new(way: Way, plant: Plant) -> Self {
+    fn new(way: Way, has_room_for_two: bool) -> Self {
         let mut world = World::with_gravity(glam::Vec3::ZERO);
         // With CCD, calls between the two of a step, for a part of it.
         world.params.max_ccd_substeps = 3;
-        let broad_phase = Timed::new(Subject::new(way, plant)).checked(way.margin, 1);
+        let broad_phase = Timed::new(Subject::new(way, has_room_for_two)).checked(way.margin, 1);
         Self { world, broad_phase, way, tally: OperationCounts { runs: 1, ..OperationCounts::default() } }
     }
 
@@ -158,7 +159,8 @@ impl RandomScene {
         self.tally.steps += 1;
         self.tally.beside_stock += u64::from(self.watcher().has_stock());
         self.tally.oracle_pairs = self.watcher().checker.oracle_pairs;
-        let answers = self.broad_phase.inner.ask(&self.world, self.tally.steps);
+        // Right after a step each box holds its collider.
+        let answers = compare_with_tree(&self.world, &self.broad_phase.inner.pbig, self.tally.steps);
         self.tally.hits += answers.map_err(End::Wrong)?;
         Ok(())
     }
@@ -176,8 +178,12 @@ impl RandomScene {
 }
 
 /// Plays the operations and another step, so that the last one is seen too; or says what was wrong.
-fn run(ops: &[Op], way: impl Into<Way>, plant: Plant) -> Result<Outcome, String> {
-    let mut scene = RandomScene::new(way.into(), plant);
+fn run(ops: &[Op], way: impl Into<Way>) -> Result<Outcome, String> {
+    run_with(ops, way.into(), false)
+}
+
+fn run_with(ops: &[Op], way: Way, has_room_for_two: bool) -> Result<Outcome, String> {
+    let mut scene = RandomScene::new(way, has_room_for_two);
     match ops.iter().try_for_each(|op| scene.play(*op)).and_then(|()| scene.step()) {
         Ok(()) => Ok(scene.outcome()),
         Err(End::Wrong(what)) => Err(what),
@@ -243,14 +249,13 @@ fn on_random_ops(runs: u64, test: impl Fn(&[Op]) -> Result<Outcome, String>) -> 
 #[test]
 fn random_worlds_agree_with_stock_and_the_oracle() {
     let [cpu, grid] = on_cpu();
-    let [on_cpu, on_grid] =
-        [cpu, grid].map(|config| on_random_ops(700, |ops| run(ops, config, Plant::Nothing)));
+    let [on_cpu, on_grid] = [cpu, grid].map(|config| on_random_ops(700, |ops| run(ops, config)));
     let tally = on_cpu.plus(on_grid);
     tally.assert_that_much_happened();
     assert!(tally.ops >= 100_000 || given().is_some(), "{tally:?}");
     for (_, way) in engines() {
         let way = way.with(|it| it.margin = cpu.margin);
-        on_random_ops(100, |ops| run(ops, way, Plant::Nothing)).assert_that_much_happened();
+        on_random_ops(100, |ops| run(ops, way)).assert_that_much_happened();
     }
 }
 
@@ -258,35 +263,16 @@ fn random_worlds_agree_with_stock_and_the_oracle() {
 fn random_worlds_on_a_gpu_have_the_bits_of_the_cpu() {
     needs_gpu!();
     let tally = on_random_ops(20, |ops| {
-        let found = run(ops, on_gpu(), Plant::Nothing)?;
-        found.compare(&run(ops, on_cpu()[0], Plant::Nothing)?)?;
+        let found = run(ops, on_gpu())?;
+        found.compare(&run(ops, on_cpu()[0])?)?;
         Ok(found)
     });
     tally.assert_that_much_happened();
 }
 
 #[test]
-fn a_snapshot_anywhere_continues_bit_identically() {
-    let config = on_cpu()[0];
-    let tally = on_random_ops(60, |ops| {
-        // A fresh broad phase has other fat boxes than one that was there all along, so other pairs.
-        let saved =
-            |op: &Op| if matches!(op.act, Act::Fresh) { Op { act: Act::Snapshot, ..*op } } else { *op };
-        let ops: Vec<Op> = ops.iter().map(saved).collect();
-        let kept: Vec<Op> = ops.iter().copied().filter(|op| !matches!(op.act, Act::Snapshot)).collect();
-        let with = run(&ops, config, Plant::Nothing)?;
-        with.compare(&run(&kept, config, Plant::Nothing)?)?;
-        Ok(with)
-    });
-    tally.assert_that_much_happened();
-}
-
-#[test]
-fn planted_faults_are_noticed_and_shrink_to_a_few_operations() {
-    for plant in [Plant::RoomForTwo, Plant::OnlyMoved, Plant::Forgets, Plant::Late] {
-        let failing = |ops: &[Op]| run(ops, on_cpu()[0], plant).map(|_| ());
-        let (why, ops) = try_random_ops(100, &failing).expect_err("the fault is noticed");
-        println!("{plant:?}: {why}\n{}", listed(&ops));
-        assert!(ops.len() <= 6, "{plant:?} needs {} operations:\n{}", ops.len(), listed(&ops));
-    }
+fn a_planted_fault_is_noticed_and_shrinks_to_a_few_operations() {
+    let failing = |ops: &[Op]| run_with(ops, on_cpu()[0].into(), true).map(|_| ());
+    let (why, ops) = try_random_ops(100, &failing).expect_err("the fault is noticed");
+    assert!(ops.len() <= 6, "{why}: {} operations:\n{}", ops.len(), listed(&ops));
 }
