@@ -65,17 +65,20 @@ fn a_multitude_leaves_the_same_behind_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_fixed_collider_has_no_margin_until_it_moves() {
-    everywhere(|mut scene| {
-        scene.ball(0.0);
-        let (fixed, _) = scene.ball(1.017);
-        scene.world.bodies[fixed].set_body_type(RigidBodyType::Fixed, true);
-        assert_eq!(scene.step(), 0, "the gap is wider than the margin of one");
-        scene.move_to(fixed, 2.0);
-        assert_eq!(scene.step(), 0);
-        scene.move_to(fixed, 1.017);
-        assert_eq!(scene.step(), 1, "the gap is narrower than both margins");
-    });
+fn a_collider_that_is_fixed_or_sleeps_has_no_margin_until_it_moves() {
+    let fix = |body: &mut RigidBody| body.set_body_type(RigidBodyType::Fixed, true);
+    for still in [fix, RigidBody::sleep] {
+        everywhere(|mut scene| {
+            scene.ball(0.0);
+            let (body, _) = scene.ball(1.017);
+            still(&mut scene.world.bodies[body]);
+            assert_eq!(scene.step(), 0, "the gap is wider than the margin of one");
+            scene.move_to(body, 2.0);
+            assert_eq!(scene.step(), 0);
+            scene.move_to(body, 1.017);
+            assert_eq!(scene.step(), 1, "the gap is narrower than both margins");
+        });
+    }
 }
 
 #[test]

@@ -108,6 +108,3 @@ impl<T: Tree> Colliders<T> {
         }
     }
 }
-
-#[cfg(all(test, feature = "parallel"))]
-mod tests;
