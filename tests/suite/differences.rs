@@ -1,7 +1,7 @@
 //! The rows of docs/DROP_IN.md that a short scene can show: rapier 0.27's own broad phase, then ours.
 
-use crate::stress::memory::held;
 use glam::Vec3;
+use pbig_harness::counting::held;
 use pbig_harness::world::World;
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::parry::query::DefaultQueryDispatcher;

@@ -1,4 +1,4 @@
-//! Everything that a user sees: reasons, statistics, spans, pictures, and the shadow.
+//! Everything that a user sees: reasons, statistics, spans, and the shadow.
 
 use crate::checked::{Checked, everywhere, pbig};
 use pbig_core::{Backend, Config, Engine};
@@ -7,8 +7,7 @@ use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
 use pbig_tests::{Way, needs_gpu};
 use rapier_pbig::shadow::{Fault, Shadow};
-use rapier_pbig::{DebugRenderParts, PbigBroadPhase, PbigConfig, Why};
-use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
+use rapier_pbig::{PbigBroadPhase, PbigConfig, Why};
 use rapier3d::prelude::*;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -177,51 +176,6 @@ fn each_stage_is_a_span() {
     needs_gpu!();
     let of_gpu = spans(Config { backend: Backend::Device, ..PbigConfig::DEFAULT.into() });
     assert!(of_gpu.is_superset(&["update", "proxies", "device", "events"].into()), "{of_gpu:?}");
-}
-
-/// Boxes drawn by kind of colour, from their lines.
-#[derive(Default)]
-struct Canvas {
-    lines: usize,
-    longest: f32,
-    colors: BTreeSet<[u32; 4]>,
-}
-
-impl DebugRenderBackend for Canvas {
-    fn draw_line(&mut self, object: DebugRenderObject, a: Point<f32>, b: Point<f32>, color: DebugColor) {
-        assert!(matches!(object, DebugRenderObject::ColliderAabb(..)));
-        self.lines += 1;
-        self.longest = self.longest.max((a - b).norm());
-        self.colors.insert(color.map(f32::to_bits));
-    }
-}
-
-#[test]
-fn boxes_and_cells_are_drawn_with_twelve_lines_each() {
-    let config = Config { engine: Some(Engine::Grid), backend: Backend::Cpu, ..PbigConfig::DEFAULT.into() };
-    let mut world = World::with_gravity(glam::Vec3::ZERO);
-    for i in 0..64 {
-        let at = glam::vec3((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32) * 5.0;
-        world.add(World::dynamic(at).can_sleep(false), ColliderBuilder::cuboid(0.5, 0.5, 0.5));
-    }
-    // Eight in one cell.
-    for _ in 0..8 {
-        let body = World::dynamic(glam::Vec3::splat(20.0)).can_sleep(false).lock_translations();
-        world.add(body, ColliderBuilder::ball(0.5));
-    }
-    let mut broad_phase = pbig(config);
-    world.step(&mut broad_phase);
-    let draw = |fat_boxes, cells| {
-        let mut canvas = Canvas::default();
-        broad_phase.debug_render(&world.colliders, DebugRenderParts { fat_boxes, cells }, &mut canvas);
-        canvas
-    };
-    let (boxes, cells, all) = (draw(true, false), draw(false, true), draw(true, true));
-    assert_eq!(boxes.lines, 72 * 12);
-    assert!((boxes.longest - 1.022).abs() < 1e-4, "a cube with its margins: {}", boxes.longest);
-    assert_eq!(all.lines, boxes.lines + cells.lines);
-    assert!(cells.lines % 12 == 0 && cells.lines > 12 && cells.lines <= 65 * 12, "{}", cells.lines);
-    assert!(cells.longest >= 1.022 && cells.colors.len() > 1, "full and nearly empty cells differ");
 }
 
 #[test]

@@ -15,14 +15,17 @@ mod gpu;
 mod incremental;
 mod kernels;
 mod look_ups;
-mod motions;
 mod order;
 mod peak;
 mod planted;
 mod queries;
 mod random_worlds;
 mod restore;
-mod scalable_ccd;
 mod stress;
 mod upstream;
 mod worlds;
+
+use pbig_harness::counting::Counting;
+
+#[global_allocator]
+static COUNTING: Counting = Counting;

@@ -4,24 +4,12 @@ use super::{everywhere, intervals, product, through_updates};
 use crate::follower::Follower;
 use pbig_core::{Aabb, ProxyFilter};
 use pbig_tests::{set, shifted, strategies};
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 
 const INFINITY: f32 = f32::INFINITY;
 const SMALLEST: f32 = f32::from_bits(1);
 
 fn pile(n: usize) -> Vec<Aabb> {
     set("pile", n, 1)
-}
-
-#[test]
-fn sizes_over_twelve_decades_in_one_scene() {
-    let mut rng = StdRng::seed_from_u64(12);
-    let size = |i: usize| 10f32.powf((i % 121) as f32 / 10.0 - 6.0);
-    // Around its like a box has neighbours of its size: places are as far from the middle as boxes are large.
-    let mut place = |i: usize| std::array::from_fn(|_| size(i * 7) * rng.random_range(-60.0..60.0));
-    let boxes: Vec<Aabb> = (0..1100).map(|i| Aabb::from_center(place(i), [size(i) / 2.0; 3])).collect();
-    everywhere("twelve decades", &boxes);
 }
 
 #[test]
@@ -38,14 +26,6 @@ fn offsets_from_one_to_1e30_each_alone_and_all_at_once() {
         all.extend(there);
     }
     everywhere("at all offsets", &all);
-}
-
-#[test]
-fn rasters_of_denormals() {
-    for unit in [SMALLEST, 8.0 * SMALLEST, f32::MIN_POSITIVE] {
-        let rows: Vec<[f32; 2]> = (-3..4).map(|i| [i as f32 * unit, (i + 1) as f32 * unit]).collect();
-        everywhere(&format!("raster of {unit:e}"), &product(&rows, &rows, &rows));
-    }
 }
 
 /// Every box between two of some numbers on one axis, and of fewer on the others: alone, and some of them among small ones.

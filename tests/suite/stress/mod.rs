@@ -3,17 +3,15 @@
 
 mod extremes;
 mod fuzzed;
-pub(crate) mod memory;
 mod motion;
 mod multitudes;
 mod shapes;
 mod soak;
-mod soak_worlds;
 
 use crate::finder::check;
 use crate::follower::Follower;
 use pbig_core::{Aabb, Backend, Config, ProxyFilter};
-use pbig_tests::{Way, engines, gpu, may_run};
+use pbig_tests::{Way, corpus, engines, gpu, may_run};
 
 /// Tests a set through the finder, and through updates in which its boxes change places.
 fn everywhere(name: &str, boxes: &[Aabb]) {
@@ -27,6 +25,11 @@ fn ways_to_update() -> Vec<(&'static str, Way)> {
     ways.extend(engines());
     ways.push(("gpu grid", gpu()));
     ways.into_iter().filter(|(_, way)| may_run(way)).collect()
+}
+
+#[test]
+fn the_corpus_through_updates() {
+    corpus().iter().for_each(|case| through_updates(&case.name, &shuffled(&case.boxes)));
 }
 
 /// Plays the frames of a world one after the other. On the CPU also with a margin; on a GPU that would take too long.

@@ -1,26 +1,8 @@
-//! Boxes by the thousand in one place: complete, or an error that names the limit.
+//! Boxes by the thousand in one place.
 
-use super::{everywhere, ways_to_update};
-use crate::finder::check_on;
+use super::ways_to_update;
 use crate::follower::Follower;
 use pbig_core::{Aabb, ProxyFilter};
-use pbig_tests::strategies;
-
-/// No two alike, each two overlapping.
-#[test]
-fn everything_overlapping_everything() {
-    let half = |i: usize| [i, i * 3 % 997, i * 5 % 991].map(|edge| 1.0 + edge as f32);
-    everywhere("nested", &(0..500).map(|i| Aabb::from_center([0.3; 3], half(i))).collect::<Vec<_>>());
-}
-
-#[test]
-fn identical_boxes_by_the_thousand_in_three_places() {
-    let places = [[0.0; 3], [5.0, 0.0, 0.0], [1e7, -1e7, 3.0]];
-    for half in [0.0, 0.5] {
-        let boxes: Vec<Aabb> = (0..3003).map(|i| Aabb::from_center(places[i % 3], [half; 3])).collect();
-        check_on(strategies(), &format!("identical, half extent {half}"), &boxes);
-    }
-}
 
 /// Thousands in one place of which few may pair, through updates in which some leave and come back.
 #[test]

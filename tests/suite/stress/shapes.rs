@@ -1,53 +1,9 @@
-//! Worlds that are flat, thin or on the borders of cells.
+//! Boxes on the borders of cells.
 
-use super::everywhere;
 use crate::follower::Follower;
 use pbig_core::{Aabb, Algorithm, Config, Engine, Plan, ProxyFilter};
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::shifted;
-
-#[test]
-fn flat_worlds_of_any_thickness_on_every_axis() {
-    for axis in 0..3 {
-        for thickness in [0.0, f32::from_bits(1), 0.5] {
-            let place = |i: usize| {
-                let (u, v) = ((i % 36) as f32 * 0.97, (i / 36) as f32 * 1.03);
-                let mut at = [[u, v, 0.0], [u, 0.0, v], [0.0, u, v]][axis].map(|x| x - 17.0);
-                at[2 - axis] = 3.0;
-                at
-            };
-            let mut half = [0.5; 3];
-            half[2 - axis] = thickness;
-            let boxes: Vec<Aabb> = (0..1200).map(|i| Aabb::from_center(place(i), half)).collect();
-            everywhere(&format!("flat, normal to axis {}, thickness {thickness}", 2 - axis), &boxes);
-        }
-    }
-}
-
-#[test]
-fn linear_worlds_along_axes_and_diagonals() {
-    for direction in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0], [1.0, -1.0, 1e-3]] {
-        let on_line =
-            |i: usize, half: [f32; 3]| Aabb::from_center(direction.map(|d| d * i as f32 * 0.7), half);
-        let beads: Vec<Aabb> = (0..1100).map(|i| on_line(i, [0.5; 3])).collect();
-        everywhere(&format!("beads along {direction:?}"), &beads);
-        // Thin as the line itself: segments that touch end to end.
-        let segments: Vec<Aabb> =
-            (0..300).map(|i| on_line(i, direction.map(|d: f32| d.abs() * 0.35))).collect();
-        everywhere(&format!("segments along {direction:?}"), &segments);
-    }
-}
-
-#[test]
-fn needles_a_billion_times_longer_than_thick() {
-    let needle = |i: usize| {
-        let mut half = [1e-4; 3];
-        half[i % 3] = [1e5, 10.0, 1.0][i / 3 % 3];
-        let at = [i * 17 % 23, i * 29 % 31, i * 7 % 19].map(|x| x as f32 * 0.05);
-        Aabb::from_center(at, half)
-    };
-    everywhere("needles", &(0..1100).map(needle).collect::<Vec<_>>());
-}
 
 /// The box moved so that its lower or upper corner is on a border of a plan's cells, or one ulp beside it.
 fn onto_border(aabb: &Aabb, plan: &Plan, i: usize) -> Aabb {

@@ -1,17 +1,17 @@
 //! Churn for ever: boxes come, move, change their filters and go. Memory stays what it is, and nothing drifts away from
 //! the oracle. `PBIG_SOAK` is the number of updates, a few thousand without.
 
-use super::memory;
 use crate::follower::Follower;
 use pbig_core::{Aabb, Backend, BroadPhase, Config, Engine, ProxyFilter, Report};
 use pbig_gpu::GpuFinder;
+use pbig_harness::counting::held;
 use pbig_tests::{Way, gpu, needs_gpu, on_threads, set, shifted};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeMap;
 use std::io::Write;
 
-pub(super) fn given() -> Option<usize> {
+fn given() -> Option<usize> {
     let given = std::env::var("PBIG_SOAK").ok();
     given.map(|n| n.parse().expect("PBIG_SOAK is a number of updates"))
 }
@@ -134,9 +134,9 @@ impl SoakCounts {
 /// Returns the bytes that all threads hold. One thread may free memory of another, so only the sum counts.
 fn held_by_all() -> i64 {
     if rayon::current_num_threads() == 1 {
-        return memory::held();
+        return held();
     }
-    rayon::broadcast(|_| memory::held()).into_iter().sum()
+    rayon::broadcast(|_| held()).into_iter().sum()
 }
 
 /// On one thread.
