@@ -54,24 +54,3 @@ fn add(world: &mut World, aabb: &Aabb) -> RigidBodyHandle {
     let half = (max - min) / 2.0;
     world.add(World::dynamic((min + max) / 2.0), ColliderBuilder::cuboid(half.x, half.y, half.z))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::boxes::BoxSet;
-    use rapier_pbig::PbigBroadPhase;
-
-    #[test]
-    fn movers_are_listed_and_their_colliders_move_with_them() {
-        let boxes = BoxSet::named("unit").expect("the set exists").boxes(50, 1);
-        let mut field = Field::new(&boxes);
-        let place = |field: &Field, i: usize| *field.world.colliders[field.colliders[i]].translation();
-        let before = [place(&field, 3), place(&field, 4)];
-        assert_eq!(field.shift(&[3], 1.0), [field.colliders[3]]);
-        assert_ne!(place(&field, 3), before[0]);
-        assert_eq!(place(&field, 4), before[1]);
-        let (mut broad_phase, mut events) = (PbigBroadPhase::new(), Vec::new());
-        field.call(&mut broad_phase, &field.colliders, &mut events);
-        assert!(!events.is_empty());
-    }
-}

@@ -136,10 +136,7 @@ impl Mesh {
     }
 
     /// Returns the boxes of all elements, around given ones of the vertices.
-    ///
-    /// # Panics
-    /// If there is no box for a vertex of a face or rod.
-    pub fn elements_around(&self, vertices: Vec<Aabb>) -> MeshElements {
+    fn elements_around(&self, vertices: Vec<Aabb>) -> MeshElements {
         let edges = self.edges().into_iter().map(|[a, b]| [a, b, NO_KEY, NO_KEY]).collect();
         let (edges, faces) = (Elements::new(edges, &vertices), Elements::new(self.faces.clone(), &vertices));
         let keys = (0..vertices.len() as u32).map(|vertex| [vertex, NO_KEY, NO_KEY, NO_KEY]).collect();

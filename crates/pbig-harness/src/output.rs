@@ -99,13 +99,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failed_check_is_1_and_bad_input_is_2() {
-        let code = |failure: Failure| format!("{:?}", failure.code());
-        assert_eq!(code(Failure::Check(String::new())), format!("{:?}", ExitCode::from(1)));
-        assert_eq!(code(Failure::Input(String::new())), format!("{:?}", ExitCode::from(2)));
-    }
-
-    #[test]
     fn a_message_is_one_line_of_bearable_length() {
         let text = Failure::Input(format!("a\nb\u{1b}[1m{}", "x".repeat(10_000))).to_string();
         assert!(text.starts_with("a b [1mx") && text.len() < 700, "{text}");

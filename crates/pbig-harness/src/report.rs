@@ -122,17 +122,6 @@ mod tests {
     }
 
     #[test]
-    fn a_file_has_the_machine_in_its_head_and_a_row_a_case() {
-        let head = vec![("adapter", "some".to_owned())];
-        let one = BenchReport { head, ..BenchReport::new("suite", vec![table("one")]) };
-        let (name, text) = &one.files()[0];
-        assert!(text.starts_with("# machine: ") && text.contains("\n# commit: "), "{text}");
-        assert!(text.ends_with("# adapter: some\ncase,ms\n\"a, b\",0.5\n"), "{text}");
-        assert_eq!(name, "suite.csv");
-        assert_eq!(one.object()["tables"]["one"][0]["ms"], 0.5);
-    }
-
-    #[test]
     fn each_table_has_a_file_and_an_error_names_it() {
         let folder = tempfile::tempdir().expect("a folder");
         let inner = folder.path().join("inner");

@@ -48,6 +48,42 @@ fn ply_files_are_read_as_text_and_binary() {
     }
 }
 
+/// Three vertices of a triangle.
+const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+
+#[test]
+fn a_triangle_is_read_in_every_form_that_programs_write() {
+    let plain = HEAD.replace("property uchar red\n", "") + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let strips = "element tristrips 1\nproperty list int int";
+    let obj = [
+        format!("{OBJ}f 1 2 3"),
+        format!("\u{feff}# a\n{OBJ}f 1/1 2//2 -1/3/3\n").replace('\n', "\r"),
+        format!("{OBJ}fo +1 +2 +3\n").replace('0', "0d0").replace(' ', "\t"),
+    ];
+    let ply = [
+        plain.replace("\n0 0 0\n", "\nnan .5 5.\n"),
+        plain.replace("\n0 0 0\n", "\n-inf 1e3 -.5\n\n"),
+        plain.replace('\n', "\r"),
+        plain.replace('\n', "\r\n"),
+        plain.replace("ply", "\u{feff}PLY").replace("element", "\n \telement").replace("float x", "float X"),
+        plain.replace("vertex 3", "Vertex 3").replace("face 1", "FACE 1").replace("ascii", "ASCII"),
+        plain.replace("3 0 1 2", "3.0 0.0 1.0 2.0").replace("uchar", "float32"),
+        plain.replace("vertex_indices", "vertex_index").replace("ascii 1.0", "ascii"),
+        plain
+            .replace("vertex_indices\n", "vertex_indices\nproperty float a.b:c\n")
+            .replace("0 1 2\n", "0 1 2 7\n"),
+        plain
+            .replace("element face 1\nproperty list uchar int", strips)
+            .replace("3 0 1 2", "7 0 1 -1 0 1 2 -1"),
+    ];
+    let files = obj.iter().map(|text| ("a.obj", text)).chain(ply.iter().map(|text| ("a.ply", text)));
+    for (name, text) in files {
+        let mesh = read(name, text.as_bytes()).expect(text);
+        let counts = (mesh.vertices.len(), mesh.edges().len(), mesh.rods.len());
+        assert_eq!((counts, mesh.faces), ((3, 3, 0), vec![[0, 1, 2, NO_KEY]]), "{text:?}");
+    }
+}
+
 /// Behind a header whose lines end with `\r`, the byte `\n` is a value; behind one of `\r\n`, the end of its last line.
 #[test]
 fn binary_values_begin_right_behind_the_header() {

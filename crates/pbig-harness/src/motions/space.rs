@@ -34,23 +34,3 @@ fn near(part: f64) -> f64 {
 fn near_in_a_fall(part: f64) -> f64 {
     1.0 - (1.0 - part).sqrt() + part * (1.0 / part - 1.0).sqrt().asinh()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn chances_are_those_of_counted_numbers() {
-        const N: usize = 1000;
-        let place = |i: usize| (i as f64 + 0.5) / N as f64;
-        for part in [0.01, 0.1, 0.5, 1.0] {
-            let counted = |of: fn(f64) -> f64| {
-                let close =
-                    |i: usize| (0..N).filter(|&j| (of(place(i)) - of(place(j))).abs() <= part).count();
-                (0..N).map(close).sum::<usize>() as f64 / (N * N) as f64
-            };
-            assert!((near(part) - counted(|x| x)).abs() < 0.003, "{part}");
-            assert!((near_in_a_fall(part) - counted(|x| x * x)).abs() < 0.003, "{part}");
-        }
-    }
-}
