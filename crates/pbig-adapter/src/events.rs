@@ -121,18 +121,4 @@ mod tests {
             assert!(events.iter().all(is_second), "the ground comes last");
         }
     }
-
-    #[test]
-    fn an_adopted_pair_ends_as_it_began() {
-        let (registry, mut writer) = (ColliderRegistry::from_generations(vec![0; 2]), EventWriter::default());
-        let [a, b] = handles(Pair::new(0, 1), &registry);
-        let (mut events, mut added, mut removed) = (Vec::new(), Events::default(), Events::default());
-        (added.added, removed.removed) = (vec![Pair::new(0, 1)], vec![Pair::new(0, 1)]);
-        writer.adopt(vec![HandlePair(b, a)], true);
-        writer.write(&added, &registry, |_| 1, |event| events.push(event));
-        assert_eq!(events, [], "it is known");
-        writer.write(&removed, &registry, |_| 1, |event| events.push(event));
-        writer.write(&added, &registry, |_| 1, |event| events.push(event));
-        assert_eq!(events, [PairEvent::Delete(HandlePair(b, a)), PairEvent::Add(HandlePair(a, b))]);
-    }
 }
