@@ -4,7 +4,6 @@ mod bench;
 mod files;
 mod gpu;
 mod margin;
-mod mesh;
 mod refused;
 mod replay;
 mod sets;

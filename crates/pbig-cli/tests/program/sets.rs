@@ -103,6 +103,8 @@ fn a_mesh_tells_what_it_lacks_and_which_elements_are_invalid() {
         "{summary}"
     );
     assert_eq!(warnings, "pbig: warning: point.obj: the mesh has no faces, and vf no pairs\n");
+    let object = json(&pbig(here, &["pairs", "--mesh", "point.obj", "--elements", "vv", "--json"]));
+    assert_eq!(object["notes"], serde_json::json!(["point.obj: no faces and no rods"]));
     let faces = "f 1 2 3\nf 2 3 4\nf 1 2 4\nf 1 3 4\n";
     write(here, "nan.obj", &format!("v 0 0 0\nv nan 0 0\nv 0 nan 0\nv 0 0 1\n{faces}"));
     let [summary, warnings] = run("nan.obj", "vf,vv,ff");
@@ -132,12 +134,20 @@ fn a_wrong_mesh_or_option_is_refused_in_one_line() {
         &mesh("mesh.obj", &["--elements", "ee", "--next", "less.obj"]),
         &["less.obj: not a frame of the same mesh"],
     );
-    write(here, "four.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 9\n");
+    write(here, "nan.obj", &MESH.replace("v 2 2 0", "v 2 2 nan"));
     refused(
-        &mesh("four.obj", &["--elements", "ee"]),
-        &["pbig: four.obj: line 5: vertex 9 does not exist; the file has 4"],
+        &mesh("mesh.obj", &["--elements", "ee", "--next", "nan.obj", "--strict"]),
+        &["nan.obj: line 4: vertex 4 (counted from 1) has a NaN; mend it, or leave out --strict"],
     );
-    refused(&pbig(here, &["pairs", "mesh.obj"]), &["this is a mesh; use --mesh mesh.obj"]);
+    refused(
+        &pbig(here, &["pairs", "mesh.obj"]),
+        &["this is a mesh; use --mesh mesh.obj --elements ee, or vf"],
+    );
+    write(here, "a.csv", "0,0,0,1,1,1\n");
+    refused(
+        &pbig(here, &["pairs", "a.csv", "--with", "cloth.OBJ"]),
+        &["this is a mesh; use --mesh cloth.OBJ"],
+    );
     refused(&mesh("mesh.obj", &["--elements", "xx"]), &["--elements xx: must be two of v (vertex)"]);
     refused(&mesh("mesh.obj", &[]), &["--elements"]);
     refused(
