@@ -1,7 +1,6 @@
 //! `pbig doctor`: what this machine offers, what is chosen and why, and a self-test.
 
 use pbig_core::{Aabb, Backend, Config, Finder, Limits, Pair, oracle};
-use pbig_gpu::layout::DeviceBox;
 use pbig_gpu::{GpuError, GpuFinder, GpuOptions, adapters};
 use pbig_harness::prelude::*;
 use pbig_harness::report::simd_found;
@@ -137,34 +136,15 @@ fn object(candidates: &[Candidate], chosen: &Chosen, tested: &[Tested]) -> serde
     })
 }
 
-/// Returns the variant of each stage that runs on an adapter, and the reason.
-fn variants(adapter: &wgpu::Adapter) -> [String; 3] {
-    let (features, limits) = (adapter.features(), adapter.limits());
-    let times = match features.contains(wgpu::Features::TIMESTAMP_QUERY) {
-        true => "by timestamps",
-        false => "none: the adapter has no timestamps",
-    };
-    let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size) / 256 * 256;
-    [
-        "check, small cells: the device's square root, corrected by integers; large cells: balanced rows"
-            .into(),
-        format!("times of kernels: {times}"),
-        format!("sets of more than {} boxes are the CPU's", most / size_of::<DeviceBox>() as u64),
-    ]
-}
-
-/// An adapter, its limits, and the variant of each stage that runs on it and why.
+/// Describes an adapter and its limits, and says why it cannot be used.
 fn describe((i, Candidate { adapter, opened, is_used }): (usize, &Candidate)) -> String {
     let (info, limits) = (adapter.get_info(), adapter.limits());
     let chosen = if *is_used { ", used by `--backend gpu`" } else { "" };
     let mib = |bytes: u64| bytes >> 20;
-    let features = match opened {
-        Ok(_) => variants(adapter).join("\n    "),
-        Err(why) => format!("not usable: {why}"),
-    };
+    let error = opened.as_ref().err().map_or(String::new(), |why| format!("\n    not usable: {why}"));
     format!(
         "adapter gpu {i}: {}, driver {} {}{chosen}\n    \
-         limits: buffers {} MiB, bindings {} MiB, {} storage buffers, {} invocations, {} KiB workgroup memory\n    {}",
+         limits: buffers {} MiB, bindings {} MiB, {} storage buffers, {} invocations, {} KiB workgroup memory{error}",
         pbig_gpu::describe(&info),
         info.driver,
         info.driver_info,
@@ -173,7 +153,6 @@ fn describe((i, Candidate { adapter, opened, is_used }): (usize, &Candidate)) ->
         limits.max_storage_buffers_per_shader_stage,
         limits.max_compute_invocations_per_workgroup,
         limits.max_compute_workgroup_storage_size >> 10,
-        features,
     )
 }
 
