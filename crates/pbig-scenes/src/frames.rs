@@ -3,17 +3,8 @@
 
 use glam::Vec3;
 
-/// The longest way of a ray or of a cast shape, in metres.
+/// The longest way of a ray, in metres.
 pub const MAX_DISTANCE_METRES: f32 = 100.0;
-
-/// The largest distance of a point from its projection, in metres.
-pub const MAX_PROJECTION_METRES: f32 = 4.0;
-
-/// The radius of the ball that is cast, in metres.
-pub const CAST_RADIUS_METRES: f32 = 0.3;
-
-/// The radius of the ball whose neighbours are asked for, in metres.
-pub const AREA_RADIUS_METRES: f32 = 2.0;
 
 /// Half the length of the segment in the character's capsule, in metres.
 pub const CAPSULE_HALF_HEIGHT_METRES: f32 = 0.6;
@@ -37,39 +28,21 @@ const FRAMES_PER_HEADING: u64 = 30;
 pub enum FrameKind {
     None,
     Ray,
-    Rays100,
     Rays10000,
-    Cast,
     /// One move of a character controller with a capsule.
     Character,
-    /// One test of which colliders intersect a ball.
-    Boxes,
-    Point,
 }
 
 impl FrameKind {
-    pub const ALL: [Self; 8] = [
-        Self::None,
-        Self::Ray,
-        Self::Rays100,
-        Self::Rays10000,
-        Self::Cast,
-        Self::Character,
-        Self::Boxes,
-        Self::Point,
-    ];
+    pub const ALL: [Self; 4] = [Self::None, Self::Ray, Self::Rays10000, Self::Character];
 
     /// Returns the name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::None => "none",
             Self::Ray => "ray",
-            Self::Rays100 => "rays-100",
             Self::Rays10000 => "rays-10000",
-            Self::Cast => "cast",
             Self::Character => "character",
-            Self::Boxes => "boxes",
-            Self::Point => "point",
         }
     }
 
@@ -86,9 +59,8 @@ impl FrameKind {
     pub fn queries(self) -> u64 {
         match self {
             Self::None => 0,
-            Self::Rays100 => 100,
             Self::Rays10000 => 10_000,
-            Self::Ray | Self::Cast | Self::Character | Self::Boxes | Self::Point => 1,
+            Self::Ray | Self::Character => 1,
         }
     }
 }
@@ -185,7 +157,7 @@ mod tests {
             assert_eq!(extent().queries(kind, 3).count() as u64, kind.queries());
         }
         let error = FrameKind::named("rays").unwrap_err();
-        assert!(error.contains("'rays'") && error.contains("none, ray, rays-100"), "{error}");
+        assert!(error.contains("'rays'") && error.contains("none, ray, rays-10000"), "{error}");
     }
 
     #[test]

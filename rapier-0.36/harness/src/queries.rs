@@ -3,11 +3,10 @@
 use crate::world::{from_vector, pose, real, to_vector};
 use glam::Vec3;
 use pbig_scenes::frames::{
-    AREA_RADIUS_METRES, CAPSULE_HALF_HEIGHT_METRES, CAPSULE_RADIUS_METRES, CAST_RADIUS_METRES, Extent,
-    FRAME_SECONDS, FrameKind, MAX_DISTANCE_METRES, MAX_PROJECTION_METRES, Query,
+    CAPSULE_HALF_HEIGHT_METRES, CAPSULE_RADIUS_METRES, Extent, FRAME_SECONDS, FrameKind, MAX_DISTANCE_METRES,
+    Query,
 };
 use rapier::control::KinematicCharacterController;
-use rapier::parry::query::ShapeCastOptions;
 use rapier::prelude::*;
 
 /// The queries of one frame after the other.
@@ -35,15 +34,10 @@ impl FrameQueries {
     }
 
     fn hits(&mut self, queries: &QueryPipeline<'_>) -> u64 {
-        let hits_of: fn(&QueryPipeline<'_>, Query) -> usize = match self.kind {
-            FrameKind::None => return 0,
-            FrameKind::Character => return self.walk(queries),
-            FrameKind::Ray | FrameKind::Rays100 | FrameKind::Rays10000 => ray,
-            FrameKind::Cast => cast,
-            FrameKind::Boxes => area,
-            FrameKind::Point => point,
-        };
-        self.extent.queries(self.kind, self.frame).map(|query| hits_of(queries, query) as u64).sum()
+        if self.kind == FrameKind::Character {
+            return self.walk(queries);
+        }
+        self.extent.queries(self.kind, self.frame).map(|query| ray(queries, query) as u64).sum()
     }
 
     /// Moves the character, and returns its collisions.
@@ -71,18 +65,4 @@ fn extent(world: &PhysicsWorld) -> Extent {
 fn ray(queries: &QueryPipeline<'_>, query: Query) -> usize {
     let ray = Ray::new(to_vector(query.origin), to_vector(query.direction));
     queries.cast_ray(&ray, real(MAX_DISTANCE_METRES), true).iter().count()
-}
-
-fn cast(queries: &QueryPipeline<'_>, query: Query) -> usize {
-    let (at, along) = (pose(query.origin), to_vector(query.direction));
-    let options = ShapeCastOptions::with_max_time_of_impact(real(MAX_DISTANCE_METRES));
-    queries.cast_shape(&at, along, &Ball::new(real(CAST_RADIUS_METRES)), options).iter().count()
-}
-
-fn area(queries: &QueryPipeline<'_>, query: Query) -> usize {
-    queries.intersect_shape(pose(query.origin), &Ball::new(real(AREA_RADIUS_METRES))).count()
-}
-
-fn point(queries: &QueryPipeline<'_>, query: Query) -> usize {
-    queries.project_point(to_vector(query.origin), real(MAX_PROJECTION_METRES), true).iter().count()
 }

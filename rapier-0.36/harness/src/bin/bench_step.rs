@@ -19,7 +19,7 @@ struct Args {
     /// Scenes, several separated by commas; all by default.
     #[arg(long, value_delimiter = ',', value_parser = Scene::named)]
     scenes: Vec<Scene>,
-    /// Scene queries after each step, several kinds separated by commas: none, ray, rays-100, rays-10000, cast, character, boxes or point.
+    /// Scene queries after each step, several kinds separated by commas: none, ray, rays-10000 or character.
     #[arg(long, value_name = "KIND", value_delimiter = ',', default_value = "none", value_parser = FrameKind::named)]
     queries: Vec<FrameKind>,
     /// Steps of 1/60 s.
