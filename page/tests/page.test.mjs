@@ -11,7 +11,7 @@ const program = process.env.NATIVE_PAIRS;
 const shots = process.env.SHOTS ?? "../out/page-shots";
 const STEPS = 300;
 // Scenes in which rapier's numbers are the same on both sides for so many steps; page/README.md says why others' are not.
-const EQUAL_SCENES = ["column", "galton", "rain", "sensors"];
+const EQUAL_SCENES = ["column", "cubes", "rain", "sensors"];
 
 let server, browser;
 

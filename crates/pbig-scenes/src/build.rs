@@ -2,7 +2,6 @@
 
 use crate::plan::{Body, BodyKind, Collider, Joint, JointKind, Plan, Shape};
 use crate::world::{World, pose, to_point, to_vector, turned};
-use glam::Vec3;
 use rapier3d::prelude::*;
 
 impl World {
@@ -32,7 +31,7 @@ fn rigid_body(body: &Body) -> RigidBodyBuilder {
         BodyKind::Fixed => RigidBodyBuilder::fixed(),
         BodyKind::Kinematic => RigidBodyBuilder::kinematic_velocity_based(),
     };
-    let built = built
+    built
         .position(turned(body.at, body.turn))
         .linvel(to_vector(body.linvel))
         .angvel(to_vector(body.angvel))
@@ -40,19 +39,11 @@ fn rigid_body(body: &Body) -> RigidBodyBuilder {
         .sleeping(body.is_sleeping)
         .ccd_enabled(body.has_ccd)
         .soft_ccd_prediction(body.soft_ccd)
-        .gravity_scale(body.gravity_scale)
-        .linear_damping(body.damping);
-    let built = if body.keeps_z { built.enabled_translations(true, true, false) } else { built };
-    let mass = || MassProperties::new(to_point(Vec3::ZERO), 1.0, to_vector(Vec3::ONE));
-    if body.has_own_mass { built.additional_mass_properties(mass()) } else { built }
 }
 
 fn collider(part: &Collider) -> ColliderBuilder {
     let mut built =
         ColliderBuilder::new(shape(&part.shape)).position(turned(part.at, part.turn)).sensor(part.is_sensor);
-    if let Some(density) = part.density {
-        built = built.density(density);
-    }
     if let Some(friction) = part.friction {
         built = built.friction(friction);
     }
@@ -73,10 +64,8 @@ fn shape(shape: &Shape) -> SharedShape {
     match shape {
         Shape::HalfSpace => SharedShape::halfspace(Vector::y_axis()),
         Shape::Ball(radius) => SharedShape::ball(*radius),
-        Shape::Cuboid(half, None) => SharedShape::cuboid(half.x, half.y, half.z),
-        Shape::Cuboid(half, Some(radius)) => SharedShape::round_cuboid(half.x, half.y, half.z, *radius),
+        Shape::Cuboid(half) => SharedShape::cuboid(half.x, half.y, half.z),
         Shape::Capsule(half, radius) => SharedShape::capsule(to_point(-*half), to_point(*half), *radius),
-        Shape::Cylinder(half, radius) => SharedShape::cylinder(*half, *radius),
         Shape::Heights(side, heights, scale) => {
             SharedShape::heightfield(DMatrix::from_column_slice(*side, *side, heights), to_vector(*scale))
         }
@@ -90,10 +79,7 @@ fn joint(part: &Joint) -> GenericJoint {
     let [one, other] = part.anchors.map(to_point);
     let mut built: GenericJoint = match part.kind {
         JointKind::Socket(most) => {
-            let axes = [JointAxis::AngX, JointAxis::AngY, JointAxis::AngZ]
-                .into_iter()
-                .take(if most.is_some() { 3 } else { 0 });
-            let most = most.unwrap_or_default();
+            let axes = [JointAxis::AngX, JointAxis::AngY, JointAxis::AngZ].into_iter();
             axes.fold(SphericalJointBuilder::new(), |joint, axis| joint.limits(axis, [-most, most])).into()
         }
         JointKind::Hinge(axis, limits) => {

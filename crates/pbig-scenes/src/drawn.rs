@@ -112,14 +112,6 @@ fn append_parts(shape: &dyn Shape, at: &Isometry<Real>, parts: &mut Vec<Part>, m
     match shape.as_typed_shape() {
         TypedShape::Ball(ball) => add(Kind::Ball, Colour::Ball, Vector::repeat(ball.radius)),
         TypedShape::Cuboid(cuboid) => add(Kind::Cuboid, colour_of(&cuboid.half_extents), cuboid.half_extents),
-        TypedShape::Cylinder(it) => {
-            add(Kind::Cylinder, Colour::Other, vector![it.radius, it.half_height, it.radius]);
-        }
-        // Drawn with sharp corners, so that all of them are one group.
-        TypedShape::RoundCuboid(it) => {
-            let half_extents = it.inner_shape.half_extents.add_scalar(it.border_radius);
-            add(Kind::Cuboid, colour_of(&half_extents), half_extents);
-        }
         TypedShape::HalfSpace(it) => parts.push(half_space(it, at)),
         TypedShape::Capsule(capsule) => parts.extend(capsule_parts(capsule, at)),
         TypedShape::HeightField(field) => {
@@ -185,8 +177,6 @@ mod tests {
             SharedShape::capsule_x(0.4, 0.2),
             SharedShape::capsule_y(0.4, 0.2),
             SharedShape::capsule_z(0.4, 0.2),
-            SharedShape::cylinder(0.4, 0.2),
-            SharedShape::round_cuboid(0.1, 0.2, 0.3, 0.05),
             SharedShape::compound(vec![
                 (pose, SharedShape::ball(0.5)),
                 (pose, SharedShape::cuboid(0.1, 2.0, 0.1)),

@@ -42,16 +42,11 @@ pub struct Body {
     pub has_ccd: bool,
     /// The distance in which contacts are predicted.
     pub soft_ccd: f32,
-    pub gravity_scale: f32,
-    pub damping: f32,
-    pub keeps_z: bool,
-    /// The body has a kilogramme at its origin.
-    pub has_own_mass: bool,
 }
 
 impl Body {
     pub fn dynamic(at: Vec3) -> Self {
-        Self { at, can_sleep: true, gravity_scale: 1.0, ..Self::default() }
+        Self { at, can_sleep: true, ..Self::default() }
     }
 
     pub fn fixed(at: Vec3) -> Self {
@@ -84,12 +79,10 @@ pub enum Shape {
     #[default]
     HalfSpace,
     Ball(f32),
-    /// Half the extents, and the radius by which the cuboid is rounded, if it is.
-    Cuboid(Vec3, Option<f32>),
+    /// Half the extents.
+    Cuboid(Vec3),
     /// Half the vector from the centre of one end to the other, along an axis, and the radius.
     Capsule(Vec3, f32),
-    /// Half the height, along y, and the radius.
-    Cylinder(f32, f32),
     /// The number of samples along each side, the heights (those along z side by side), and the extents.
     Heights(usize, Vec<f32>, Vec3),
     Compound(Vec<(Vec3, Shape)>),
@@ -101,8 +94,6 @@ pub struct Collider {
     pub body: Option<usize>,
     pub at: Vec3,
     pub turn: Quat,
-    /// The density, if not rapier's default.
-    pub density: Option<f32>,
     pub friction: Option<f32>,
     pub restitution: Option<f32>,
     pub is_sensor: bool,
@@ -122,7 +113,7 @@ impl Collider {
     }
 
     pub fn cuboid(x: f32, y: f32, z: f32) -> Self {
-        Self::new(Shape::Cuboid(Vec3::new(x, y, z), None))
+        Self::new(Shape::Cuboid(Vec3::new(x, y, z)))
     }
 
     /// Returns a capsule by half its length along x, and its radius.
@@ -137,10 +128,6 @@ impl Collider {
 
     pub fn at(self, at: Vec3) -> Self {
         Self { at, ..self }
-    }
-
-    pub fn density(self, density: f32) -> Self {
-        Self { density: Some(density), ..self }
     }
 
     pub fn friction(self, friction: f32) -> Self {
@@ -163,8 +150,8 @@ impl Collider {
 /// The freedom that a joint leaves.
 #[derive(Clone, Copy, Debug)]
 pub enum JointKind {
-    /// All rotations, or at most some radians around each axis.
-    Socket(Option<f32>),
+    /// Rotations by at most some radians around each axis.
+    Socket(f32),
     /// A rotation around an axis, between two angles in radians.
     Hinge(Vec3, [f32; 2]),
     /// All motion. An acceleration pulls the second body to the first: 1/s^2, for each metre of distance.

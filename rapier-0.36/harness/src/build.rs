@@ -1,6 +1,6 @@
 //! Builds the world of a plan on rapier 0.36.
 
-use crate::dimension::{angular, cuboid, cylinder, heightfield, joint, keeping_z, kilogramme, round_cuboid};
+use crate::dimension::{angular, cuboid, heightfield, joint};
 use crate::world::{pose, real, to_vector, turned};
 use pbig_scenes::plan::{Body, BodyKind, Collider, Joint, Plan, Shape};
 use rapier::prelude::*;
@@ -26,7 +26,7 @@ fn rigid_body(body: &Body) -> RigidBodyBuilder {
         BodyKind::Fixed => RigidBodyBuilder::fixed(),
         BodyKind::Kinematic => RigidBodyBuilder::kinematic_velocity_based(),
     };
-    let built = built
+    built
         .pose(turned(body.at, body.turn))
         .linvel(to_vector(body.linvel))
         .angvel(angular(body.angvel))
@@ -34,18 +34,11 @@ fn rigid_body(body: &Body) -> RigidBodyBuilder {
         .sleeping(body.is_sleeping)
         .ccd_enabled(body.has_ccd)
         .soft_ccd_prediction(real(body.soft_ccd))
-        .gravity_scale(real(body.gravity_scale))
-        .linear_damping(real(body.damping));
-    let built = if body.keeps_z { keeping_z(built) } else { built };
-    if body.has_own_mass { built.additional_mass_properties(kilogramme()) } else { built }
 }
 
 fn collider(part: &Collider) -> ColliderBuilder {
     let pose = turned(part.at, part.turn);
     let mut built = ColliderBuilder::new(shape(&part.shape)).position(pose).sensor(part.is_sensor);
-    if let Some(density) = part.density {
-        built = built.density(real(density));
-    }
     if let Some(friction) = part.friction {
         built = built.friction(real(friction));
     }
@@ -66,12 +59,10 @@ fn shape(shape: &Shape) -> SharedShape {
     match shape {
         Shape::HalfSpace => SharedShape::halfspace(Vector::Y),
         Shape::Ball(radius) => SharedShape::ball(real(*radius)),
-        Shape::Cuboid(half, None) => cuboid(*half),
-        Shape::Cuboid(half, Some(radius)) => round_cuboid(*half, *radius),
+        Shape::Cuboid(half) => cuboid(*half),
         Shape::Capsule(half, radius) => {
             SharedShape::capsule(to_vector(-*half), to_vector(*half), real(*radius))
         }
-        Shape::Cylinder(half, radius) => cylinder(*half, *radius),
         Shape::Heights(side, heights, scale) => heightfield(*side, heights, *scale),
         Shape::Compound(parts) => {
             SharedShape::compound(parts.iter().map(|(at, part)| (pose(*at), self::shape(part))).collect())

@@ -28,15 +28,6 @@ pub fn cuboid(half: Vec3) -> SharedShape {
     SharedShape::cuboid(x, y, z)
 }
 
-pub(crate) fn round_cuboid(half: Vec3, radius: f32) -> SharedShape {
-    let [x, y, z] = half.to_array().map(real);
-    SharedShape::round_cuboid(x, y, z, real(radius))
-}
-
-pub(crate) fn cylinder(half: f32, radius: f32) -> SharedShape {
-    SharedShape::cylinder(real(half), real(radius))
-}
-
 pub(crate) fn heightfield(side: usize, heights: &[f32], scale: Vec3) -> SharedShape {
     let heights = heights.iter().copied().map(real).collect();
     SharedShape::heightfield(Array2::new(side, side, heights), to_vector(scale))
@@ -47,20 +38,11 @@ pub fn soft_cube(at: Vec3, half: f32) -> SoftBodyBuilder {
     SoftBodyBuilder::cuboid(to_vector(at), Vector::splat(real(half)), 3, 3, 3)
 }
 
-pub(crate) fn kilogramme() -> MassProperties {
-    MassProperties::new(Vector::ZERO, 1.0, Vector::ONE)
-}
-
-pub(crate) fn keeping_z(body: RigidBodyBuilder) -> RigidBodyBuilder {
-    body.enabled_translations(true, true, false)
-}
-
 pub fn joint(kind: JointKind) -> GenericJoint {
     match kind {
         JointKind::Socket(most) => {
             let axes = [JointAxis::AngX, JointAxis::AngY, JointAxis::AngZ].into_iter();
-            let axes = axes.filter(|_| most.is_some());
-            let most = real(most.unwrap_or_default());
+            let most = real(most);
             axes.fold(SphericalJointBuilder::new(), |joint, axis| joint.limits(axis, [-most, most])).into()
         }
         JointKind::Hinge(axis, limits) => {

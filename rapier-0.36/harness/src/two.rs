@@ -24,14 +24,6 @@ pub fn cuboid(half: Vec3) -> SharedShape {
     SharedShape::cuboid(real(half.x), real(half.y))
 }
 
-pub(crate) fn round_cuboid(half: Vec3, radius: f32) -> SharedShape {
-    SharedShape::round_cuboid(real(half.x), real(half.y), real(radius))
-}
-
-pub(crate) fn cylinder(half: f32, radius: f32) -> SharedShape {
-    SharedShape::cuboid(real(radius), real(half))
-}
-
 /// Takes the heights along x at the first z.
 pub(crate) fn heightfield(side: usize, heights: &[f32], scale: Vec3) -> SharedShape {
     let heights = heights.iter().step_by(side).copied().map(real).collect();
@@ -43,19 +35,10 @@ pub fn soft_cube(at: Vec3, half: f32) -> SoftBodyBuilder {
     SoftBodyBuilder::grid(to_vector(at), Vector::splat(real(half)), 3, 3)
 }
 
-pub(crate) fn kilogramme() -> MassProperties {
-    MassProperties::new(Vector::ZERO, 1.0, 1.0)
-}
-
-pub(crate) fn keeping_z(body: RigidBodyBuilder) -> RigidBodyBuilder {
-    body
-}
-
 /// Returns a joint. A socket is a hinge.
 pub fn joint(kind: JointKind) -> GenericJoint {
     match kind {
-        JointKind::Socket(None) => RevoluteJointBuilder::new().into(),
-        JointKind::Socket(Some(most)) => RevoluteJointBuilder::new().limits([-most, most].map(real)).into(),
+        JointKind::Socket(most) => RevoluteJointBuilder::new().limits([-most, most].map(real)).into(),
         JointKind::Hinge(_, limits) => RevoluteJointBuilder::new().limits(limits.map(real)).into(),
         JointKind::Pull(pull) => crate::build::pull(&[JointAxis::LinX, JointAxis::LinY], pull),
     }

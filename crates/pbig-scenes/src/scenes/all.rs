@@ -1,9 +1,6 @@
 //! The list of scenes.
 
-use super::{
-    Scene, asteroids, avalanche, conveyor, falling, filtered, galton, jar, ragdolls, resting, traffic,
-    wrecking,
-};
+use super::{Scene, asteroids, conveyor, falling, filtered, jar, ragdolls, resting};
 
 /// Makes the list of rows: name, default number of bodies, builder; a description; what is hard.
 macro_rules! scenes {
@@ -14,7 +11,7 @@ macro_rules! scenes {
 
 impl Scene {
     /// Every scene.
-    pub const ALL: [Self; 22] = scenes! {
+    pub const ALL: [Self; 18] = scenes! {
         "column" 1000 falling::column,
             "spheres, cubes and slabs fall in a column onto a plane (Avril, figure 1)",
             "all boxes move at first, then rest in a heap";
@@ -45,21 +42,9 @@ impl Scene {
         "city" 3000 resting::city,
             "fixed blocks in streets, few movers among them",
             "many boxes of which few move";
-        "traffic" 2000 traffic::traffic,
-            "cars circle through a town of rings and knock barrels about",
-            "fixed and kinematic boxes, whose overlaps are no pairs";
         "rain" 1500 falling::rain,
             "small drops fall fast over a wide, hilly ground, thinly spread",
             "fast boxes in much empty space";
-        "avalanche" 1500 avalanche::avalanche,
-            "boulders roll down a valley, which is a height field",
-            "one box below all others, and a crowd that never rests";
-        "galton" 1000 galton::galton,
-            "balls fall through the pegs of Galton boards into bins",
-            "many fixed boxes close to few that move";
-        "wrecking" 1000 wrecking::wrecking,
-            "wrecking balls swing into walls of bricks",
-            "long slanted rods, whose boxes are mostly empty";
         "asteroids" 1500 asteroids::asteroids,
             "asteroids of many sizes circle and collide, pulled to the middle",
             "sizes from 0.2 to 15 in all directions, none at rest";

@@ -88,7 +88,7 @@ pub(super) fn compounds(b: &mut Builder, n: usize) {
         let place = lattice(i, side);
         let at = place * 2.6 + b.random_vec(Vec3::splat(0.1)) + Vec3::Y * 2.0;
         if i % 3 == 0 {
-            let cube = || Shape::Cuboid(Vec3::splat(0.3), None);
+            let cube = || Shape::Cuboid(Vec3::splat(0.3));
             let shapes = vec![(Vec3::new(-0.4, 0.0, 0.0), cube()), (Vec3::new(0.4, 0.2, 0.0), cube())];
             b.falling(at, Collider::new(Shape::Compound(shapes)));
         } else {

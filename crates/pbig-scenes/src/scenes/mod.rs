@@ -4,17 +4,13 @@
 
 mod all;
 mod asteroids;
-mod avalanche;
 mod builder;
 mod conveyor;
 mod falling;
 mod filtered;
-mod galton;
 mod jar;
 mod ragdolls;
 mod resting;
-mod traffic;
-mod wrecking;
 
 use crate::plan::Plan;
 #[cfg(feature = "rapier")]
@@ -42,8 +38,7 @@ impl Scene {
     }
 
     /// Returns the world with `bodies` dynamic and kinematic bodies. Figures of `ragdolls` are whole, so the last may be too
-    /// many, and `groups` adds two walls. Houses of `city` and `traffic` and sensors of `conveyor` and `sensors` count as
-    /// bodies.
+    /// many, and `groups` adds two walls. Houses of `city` and sensors of `conveyor` and `sensors` count as bodies.
     pub fn plan(&self, bodies: usize, seed: u64) -> Plan {
         let mut builder = Builder { plan: Plan::default(), rng: StdRng::seed_from_u64(seed) };
         (self.build)(&mut builder, bodies);
@@ -65,7 +60,7 @@ mod tests {
     /// Returns the number of dynamic and kinematic bodies, and of fixed parts that count as bodies.
     fn bodies_of(name: &str, world: &World) -> usize {
         let counts = |collider: &Collider| match name {
-            "city" | "traffic" => collider.shape().as_cuboid().is_some(),
+            "city" => collider.shape().as_cuboid().is_some(),
             "conveyor" | "sensors" => collider.is_sensor(),
             _ => false,
         };

@@ -84,7 +84,7 @@ impl Figure<'_> {
 
     /// Joins two parts at a point. Each turns by at most `most` radians around each axis.
     fn socket(&mut self, parent: Part, child: Part, at: Vec3, most: f32) {
-        self.join(JointKind::Socket(Some(most)), [parent, child], at);
+        self.join(JointKind::Socket(most), [parent, child], at);
     }
 
     /// Joins two parts, which never touch, at a point.

@@ -202,7 +202,7 @@ impl Player {
         if let Some(other) =
             other.filter(|&other| [body, other].iter().all(|&one| self.world.bodies[one].is_dynamic()))
         {
-            self.world.impulse_joints.insert(body, other, joint(JointKind::Socket(None)), true);
+            self.world.impulse_joints.insert(body, other, joint(JointKind::Socket(1.0)), true);
         }
     }
 
