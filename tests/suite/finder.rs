@@ -8,28 +8,35 @@ pub(crate) fn check(name: &str, boxes: &[Aabb]) {
     check_on(strategies(), name, boxes);
 }
 
-pub(crate) fn check_on(strategies: Vec<(&str, Way)>, name: &str, boxes: &[Aabb]) {
-    let wanted = oracle::pairs(boxes);
-    let invalid = boxes.iter().filter(|b| !b.is_valid()).count() as u64;
+fn check_on(strategies: Vec<(&str, Way)>, name: &str, boxes: &[Aabb]) {
     for (strategy, way) in strategies {
-        let mut finder = way.finder();
-        let found = finder.find(boxes).expect("within the limits");
-        assert_eq!(difference(found, &wanted), None, "{name}, {strategy}");
-        let report = finder.report();
-        assert_eq!(report.fallback, None, "{name}, {strategy}: a GPU's work must not be done by the CPU");
-        assert_eq!((report.boxes, report.invalid), (boxes.len() as u64, invalid), "{name}, {strategy}");
-        assert_eq!(report.pairs, wanted.len() as u64);
-        if way.backend != Backend::Device || way.gpu.count_tests {
-            let useful = report.checks.made - report.checks.unnecessary - report.checks.redundant;
-            assert_eq!(useful, wanted.len() as u64, "{name}, {strategy}: each pair has one useful check");
-        }
+        check_by(&mut way.finder(), way, &format!("{name}, {strategy}"), boxes);
     }
 }
 
+fn check_by(finder: &mut Finder, way: Way, what: &str, boxes: &[Aabb]) {
+    let wanted = oracle::pairs(boxes);
+    let invalid = boxes.iter().filter(|b| !b.is_valid()).count() as u64;
+    let found = finder.find(boxes).expect("within the limits");
+    assert_eq!(difference(found, &wanted), None, "{what}");
+    let report = finder.report();
+    assert_eq!(report.fallback, None, "{what}: a GPU's work must not be done by the CPU");
+    assert_eq!((report.boxes, report.invalid), (boxes.len() as u64, invalid), "{what}");
+    assert_eq!(report.pairs, wanted.len() as u64);
+    if way.backend != Backend::Device || way.gpu.count_tests {
+        let useful = report.checks.made - report.checks.unnecessary - report.checks.redundant;
+        assert_eq!(useful, wanted.len() as u64, "{what}: each pair has one useful check");
+    }
+}
+
+/// A finder that is used again forgets the boxes before.
 #[test]
 fn the_corpus_on_every_strategy() {
-    for case in corpus() {
-        check(&case.name, &case.boxes);
+    for (strategy, way) in strategies() {
+        let mut finder = way.finder();
+        for case in corpus() {
+            check_by(&mut finder, way, &format!("{}, {strategy}", case.name), &case.boxes);
+        }
     }
 }
 
@@ -53,19 +60,6 @@ fn hard_shapes_on_every_strategy() {
 }
 
 #[test]
-fn the_sets_of_the_paper_at_100_000() {
-    for name in ["uniform", "gaussian"] {
-        let boxes = set(name, 100_000, 7);
-        let wanted = oracle::pairs(&boxes);
-        for (strategy, way) in strategies().into_iter().filter(|(s, _)| *s != "brute") {
-            let mut finder = way.finder();
-            let found = finder.find(&boxes).expect("within the limits");
-            assert_eq!(difference(found, &wanted), None, "{name}, {strategy}");
-        }
-    }
-}
-
-#[test]
 fn the_same_bytes_for_any_number_of_threads() {
     for name in ["uniform", "gaussian", "mixed", "pile"] {
         let boxes = set(name, 40_000, 3);
@@ -76,23 +70,12 @@ fn the_same_bytes_for_any_number_of_threads() {
             })
         };
         let wanted = with_threads(1, Order::Sorted);
+        assert_eq!(difference(&wanted, &oracle::pairs(&boxes)), None, "{name}");
         for threads in [2, 3, 5, 16] {
             assert!(with_threads(threads, Order::Sorted) == wanted, "{name}, {threads} threads");
             let mut unsorted = with_threads(threads, Order::Unspecified);
             unsorted.sort_unstable();
             assert!(unsorted == wanted, "{name}, {threads} threads, unsorted");
-        }
-    }
-}
-
-#[test]
-fn a_finder_that_is_used_again_forgets_the_boxes_before() {
-    for (strategy, way) in strategies() {
-        let mut finder = way.finder();
-        for case in corpus() {
-            let wanted = oracle::pairs(&case.boxes);
-            let found = finder.find(&case.boxes).expect("within the limits");
-            assert_eq!(difference(found, &wanted), None, "{}, {strategy}", case.name);
         }
     }
 }

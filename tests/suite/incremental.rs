@@ -46,24 +46,6 @@ fn change(world: &mut Follower, rng: &mut StdRng, id: u32, new: Aabb) {
     }
 }
 
-/// Small worlds up to the largest that is swept and beyond, whether all or a few boxes change, and filters with them.
-#[test]
-fn small_worlds_of_every_width_with_all_kinds_of_boxes() {
-    let degenerate = BoxSet::named("degenerate").expect("the set exists");
-    for ids in [1, 2, 64, 255, 256, 257, 511, 513, 1023, 1024, 1025] {
-        let mut world = Follower::new(Config { margin: 0.01, ..Config::DEFAULT }, ids);
-        let mut rng = StdRng::seed_from_u64(ids as u64);
-        for round in 0..8 {
-            let changes = if round % 3 == 0 { 2 * ids } else { 1 + ids / 10 };
-            for new in degenerate.boxes(changes, round) {
-                let id = rng.random_range(0..ids as u32);
-                change(&mut world, &mut rng, id, new);
-            }
-            world.update(&format!("{ids} boxes, round {round}"));
-        }
-    }
-}
-
 /// A box that reaches to infinity is the same again when the rest of it stays within the margin.
 #[test]
 fn infinite_boxes_within_their_margin_have_not_changed() {
