@@ -39,37 +39,3 @@ fn apart(a: &Collider, b: &Collider) -> Option<Real> {
 }
 
 pbig_adapter::define_view!(apart);
-
-#[cfg(test)]
-pub(super) mod tests {
-    use super::*;
-    use pbig_adapter::shadow::View;
-
-    /// Returns two balls of radius 0.5 with this distance between their centres.
-    pub(in crate::shadow) fn balls(apart: f32) -> (ColliderSet, [ColliderHandle; 2]) {
-        let mut colliders = ColliderSet::new();
-        let mut ball = |x: f32| {
-            let types = ActiveCollisionTypes::all();
-            colliders.insert(
-                ColliderBuilder::ball(0.5).translation(vector![x, 0.0, 0.0]).active_collision_types(types),
-            )
-        };
-        let pair = [ball(0.0), ball(apart)];
-        (colliders, pair)
-    }
-
-    fn with_call<T>(apart: f32, look: impl Fn(&Call<'_>, HandlePair) -> T) -> T {
-        let (colliders, pair) = balls(apart);
-        let (params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
-        let call =
-            Call { params: &params, colliders: &colliders, bodies: &bodies, modified: &[], removed: &[] };
-        look(&call, HandlePair(handle(pair[0]), handle(pair[1])))
-    }
-
-    #[test]
-    fn contact_is_touch_or_less_than_a_prediction_distance_apart() {
-        for (apart, contact) in [(0.9, true), (1.0, true), (1.0015, true), (1.01, false), (5.0, false)] {
-            assert_eq!(with_call(apart, |call, pair| call.in_contact(pair)), contact, "{apart}");
-        }
-    }
-}
