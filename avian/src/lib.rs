@@ -33,6 +33,7 @@ mod lost;
 mod shadow;
 mod step;
 
+pub use avian;
 pub use boxes::ColliderBoxes;
 pub use pbig_core;
 pub use shadow::Shadow;

@@ -4,14 +4,15 @@
 //! cargo run --release --example step_times -- column 10000 200
 //! ```
 
-use avian::collision::CollisionDiagnostics;
+#[allow(dead_code, reason = "compare also prints a table and compares contacts")]
+#[path = "compare.rs"]
+mod compare;
+
 use avian::prelude::*;
-use avian_pbig::PbigBroadPhasePlugin;
 use bevy::prelude::*;
-use bevy::time::TimeUpdateStrategy;
+use compare::{measure, summary};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use std::time::{Duration, Instant};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
@@ -21,67 +22,26 @@ fn main() {
     let (Ok(bodies), Ok(steps)) = (bodies.parse::<usize>(), steps.parse::<usize>()) else {
         return eprintln!("BODIES and STEPS are numbers");
     };
-    let mut apps = [false, true].map(|is_pbig| app(is_pbig, scene, bodies));
-    let mut times = [vec![], vec![]];
-    for step in 0..steps + 2 {
-        for (app, times) in apps.iter_mut().zip(&mut times) {
-            let row = step_once(app);
-            // The first steps build everything.
-            if step >= 2 {
-                times.push(row);
-            }
-        }
-    }
+    let times = measure(|app| add_scene(app, scene, bodies), steps);
     println!(
         "scene,bodies,steps,avian_broad_mean_ms,pbig_broad_mean_ms,avian_broad_p99_ms,pbig_broad_p99_ms,\
         avian_step_mean_ms,pbig_step_mean_ms,avian_step_p99_ms,pbig_step_p99_ms"
     );
-    let [broad, step] = [1, 0].map(|part| times.each_ref().map(|times| mean_and_p99(times, part)));
-    let columns = [broad, step].map(|[avian, pbig]| [avian[0], pbig[0], avian[1], pbig[1]]);
-    println!(
-        "{scene},{bodies},{steps},{}",
-        columns.as_flattened().iter().map(f64::to_string).collect::<Vec<_>>().join(",")
-    );
+    let columns = [0, 1].map(|part| {
+        let [avian, pbig] = times.each_ref().map(|times| summary(times, part));
+        [avian[0], pbig[0], avian[2], pbig[2]]
+    });
+    let columns: Vec<String> = columns.as_flattened().iter().map(|time| format!("{time:.3}")).collect();
+    println!("{scene},{bodies},{steps},{}", columns.join(","));
 }
 
-/// The times of a step, in ms: the whole of it, and its broad phase.
-type Row = [f64; 2];
-
-fn step_once(app: &mut App) -> Row {
-    let start = Instant::now();
-    app.update();
-    let ms = |time: Duration| time.as_secs_f64() * 1e3;
-    let step = start.elapsed();
-    [ms(step), ms(app.world().resource::<CollisionDiagnostics>().broad_phase)]
-}
-
-/// Returns the mean and the 99th percentile of a column, to three digits.
-fn mean_and_p99(rows: &[Row], column: usize) -> [f64; 2] {
-    let mut times: Vec<f64> = rows.iter().map(|row| row[column]).collect();
-    times.sort_by(f64::total_cmp);
-    let mean = times.iter().sum::<f64>() / times.len() as f64;
-    [mean, times[(times.len() * 99 / 100).min(times.len() - 1)]].map(|time| (time * 1000.0).round() / 1000.0)
-}
-
-fn app(is_pbig: bool, scene: &str, bodies: usize) -> App {
-    let mut app = App::new();
-    let plugins = PhysicsPlugins::default().build();
-    app.add_plugins((MinimalPlugins, bevy::transform::TransformPlugin));
-    if is_pbig {
-        app.add_plugins(plugins.disable::<BvhBroadPhasePlugin>().add(PbigBroadPhasePlugin::new()));
-    } else {
-        app.add_plugins(plugins);
-    }
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 64.0)));
-    app.finish();
-    app.cleanup();
-    let rng = StdRng::seed_from_u64(1);
-    match scene {
-        "column" => column(app.world_mut(), bodies, rng),
-        "rain" => rain(app.world_mut(), bodies, rng),
-        _ => city(app.world_mut(), bodies, rng),
-    }
-    app
+fn add_scene(app: &mut App, scene: &str, bodies: usize) {
+    let spawn = match scene {
+        "column" => column,
+        "rain" => rain,
+        _ => city,
+    };
+    app.add_systems(Startup, move |world: &mut World| spawn(world, bodies, StdRng::seed_from_u64(1)));
 }
 
 fn ground(world: &mut World, width: f32) {
