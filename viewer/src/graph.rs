@@ -9,12 +9,18 @@ const INK: Rgba = [0.13, 0.16, 0.20, 1.0];
 /// The lines of the scale.
 const FAINT: Rgba = [0.13, 0.16, 0.20, 0.22];
 
-pub const fn colour_of(choice: Choice) -> Rgba {
-    match choice {
-        Choice::Stock => [0.85, 0.28, 0.14, 1.0],
-        Choice::Auto | Choice::Cpu | Choice::Brute => [0.04, 0.50, 0.46, 1.0],
-        Choice::Gpu => [0.42, 0.26, 0.80, 1.0],
-    }
+/// Returns the colour of a broad phase: that of the charts (`pbig-chart`, whose test compares) and of the page.
+pub fn colour_of(choice: Choice) -> Rgba {
+    rgba(match choice {
+        Choice::Stock => 0xd94724,
+        Choice::Auto | Choice::Cpu | Choice::Brute => 0x0a8075,
+        Choice::Gpu => 0x6b42cc,
+    })
+}
+
+fn rgba(hex: u32) -> Rgba {
+    let [_, r, g, b] = hex.to_be_bytes().map(|part| f32::from(part) / 255.0);
+    [r, g, b, 1.0]
 }
 
 /// Returns the upper end of a scale for times up to this one, in ms: 1, 2 or 5 times a power of ten.

@@ -1,4 +1,6 @@
-//! Charts as SVG: panels of lines or points over linear or logarithmic axes, with a legend beside each.
+//! Charts as SVG: panels of lines or points over linear or logarithmic axes, with a legend below each.
+
+mod colour;
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
@@ -9,27 +11,23 @@ use std::path::Path;
 /// Maximum number of lines in a panel: more cannot be told apart.
 pub const MAX_LINES: usize = 6;
 
-/// Colours that differ for the colour-blind too (Okabe and Ito).
-const COLOURS: [RGBColor; MAX_LINES] = [
-    RGBColor(213, 94, 0),
-    RGBColor(0, 114, 178),
-    RGBColor(0, 158, 115),
-    RGBColor(0, 0, 0),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-];
+/// Width of a chart and height of a plot, in pixels. On a phone's screen a chart is about 0.6 times as wide, and its text still 12 pixels high.
+const WIDTH: u32 = 600;
+const PLOT: u32 = 440;
 
-/// Size of a chart in pixels: its width, the height of one panel, and the width of the legend.
-const WIDTH: u32 = 960;
-const HEIGHT: u32 = 440;
-const LEGEND: u32 = 230;
+/// Height of the title and the label of the y axis above a plot, in pixels.
+const HEAD: u32 = 62;
 
-/// Height of text and of titles, which the drawing backend divides by 1.24: 14.5 and 18.5 pixels.
-const TEXT: u32 = 18;
-const TITLE: u32 = 23;
+/// Height of text and of titles, which the drawing backend divides by 1.24: 20 and 21 pixels.
+const TEXT: u32 = 25;
+const TITLE: u32 = 26;
 
-/// Maximum number of characters in a line of the legend.
-const LEGEND_LETTERS: usize = 26;
+/// Maximum number of characters in a line of the legend, and the height of such a line in pixels.
+const LEGEND_LETTERS: usize = 50;
+const LEGEND_LINE: u32 = 25;
+
+/// Times are drawn on a logarithmic axis if the longest is more than this many times the median of some line.
+const LINEAR_SPAN: f64 = 20.0;
 
 /// A named line of a panel.
 #[derive(Clone, Debug)]
@@ -60,6 +58,8 @@ pub struct Plot {
     pub y: String,
     /// True if both axes are logarithmic; then points have marks.
     pub is_log: bool,
+    /// True if the y axis is logarithmic, at least.
+    pub is_log_y: bool,
     /// The lines, at most [`MAX_LINES`].
     pub lines: Vec<Line>,
 }
@@ -78,7 +78,7 @@ impl Chart {
     pub fn log(name: &str, title: &str, [x, y]: [&str; 2], mut lines: Vec<Line>) -> Self {
         lines.retain(|line| !line.points.is_empty());
         let (title, x, y) = (title.into(), x.into(), y.into());
-        Self { name: name.into(), plots: vec![Plot { title, x, y, is_log: true, lines }] }
+        Self { name: name.into(), plots: vec![Plot { title, x, y, is_log: true, is_log_y: true, lines }] }
     }
 
     /// Writes the chart. An error names the file.
@@ -87,13 +87,16 @@ impl Chart {
     }
 
     fn draw(&self, path: &Path) -> Done {
-        let count = self.plots.len();
-        let root = SVGBackend::new(path, (WIDTH, HEIGHT * count.max(1) as u32)).into_drawing_area();
+        let heights: Vec<u32> = self.plots.iter().map(|plot| PLOT + plot.legend_height()).collect();
+        let root = SVGBackend::new(path, (WIDTH, heights.iter().sum::<u32>().max(PLOT))).into_drawing_area();
         root.fill(&WHITE)?;
-        for (area, plot) in root.split_evenly((count.max(1), 1)).iter().zip(&self.plots) {
-            let (area, legend) = area.split_horizontally(WIDTH - LEGEND);
+        let mut rest = root.clone();
+        for (plot, height) in self.plots.iter().zip(heights) {
+            let (area, below) = rest.split_vertically(height);
+            let (area, legend) = area.split_vertically(PLOT);
             plot.draw(&area)?;
             plot.draw_legend(&legend)?;
+            rest = below;
         }
         root.present()?;
         Ok(())
@@ -107,11 +110,25 @@ impl Plot {
     /// Returns milliseconds against steps.
     pub fn steps(title: &str, lines: Vec<Line>) -> Self {
         let (x, y) = ("step".into(), "time, ms".into());
-        Self { title: title.into(), x, y, is_log: false, lines }
+        let is_log_y = spans_much(&lines);
+        Self { title: title.into(), x, y, is_log: false, is_log_y, lines }
     }
 
     fn lines(&self) -> impl Iterator<Item = (&Line, RGBColor)> {
-        self.lines.iter().zip(COLOURS)
+        self.lines.iter().zip(colour::colours(self.lines.iter().map(|line| line.name.as_str())))
+    }
+
+    /// Returns the lines of text in the legend, each with its colour if it is the first of a name.
+    fn legend(&self) -> Vec<(Option<RGBColor>, String)> {
+        let texts = |(line, colour): (&Line, RGBColor)| {
+            let texts = textwrap::wrap(&line.name, LEGEND_LETTERS).into_iter().map(String::from);
+            texts.enumerate().map(|(i, text)| ((i == 0).then_some(colour), text)).collect::<Vec<_>>()
+        };
+        self.lines().flat_map(texts).collect()
+    }
+
+    fn legend_height(&self) -> u32 {
+        self.legend().len() as u32 * LEGEND_LINE + LEGEND_LINE
     }
 
     fn points(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
@@ -119,24 +136,27 @@ impl Plot {
     }
 
     fn has_place(&self, &(x, y): &(f64, f64)) -> bool {
-        x.is_finite() && y.is_finite() && (!self.is_log || (x > 0.0 && y >= 0.0))
+        x.is_finite() && y.is_finite() && (!self.is_log || x > 0.0) && (!self.is_log_y || y >= 0.0)
     }
 
     fn axes(&self) -> [Axis; 2] {
         let [x, y] = [self.points().map(|p| p.0).collect(), self.points().map(|p| p.1).collect()];
-        [Axis::new(x, self.is_log), Axis::new(y, self.is_log)]
+        [Axis::new(x, self.is_log), Axis::new(y, self.is_log_y)]
     }
 
     fn draw(&self, area: &Area<'_>) -> Done {
         let [x, y] = self.axes();
-        let mut chart = ChartBuilder::on(area)
-            .caption(&self.title, ("sans-serif", TITLE))
+        let (head, area) = area.split_vertically(HEAD);
+        head.draw(&Text::new(self.title.as_str(), (12, 10), ("sans-serif", TITLE).into_font()))?;
+        // Above the axis there is room for a long label, beside it there is none.
+        head.draw(&Text::new(self.y.as_str(), (12, 40), ("sans-serif", TEXT).into_font()))?;
+        let mut chart = ChartBuilder::on(&area)
             .margin(12)
-            .x_label_area_size(48)
-            .y_label_area_size(84)
+            .x_label_area_size(60)
+            .y_label_area_size(70)
             .build_cartesian_2d(x.clone(), y.clone())?;
         let mut mesh = chart.configure_mesh();
-        mesh.x_desc(&self.x).y_desc(&self.y).light_line_style(WHITE);
+        mesh.x_desc(&self.x).x_labels(8).y_labels(8).light_line_style(WHITE);
         mesh.axis_desc_style(("sans-serif", TEXT)).label_style(("sans-serif", TEXT)).draw()?;
         for (line, colour) in self.lines() {
             let place = |&(x, v): &(f64, f64)| (x, v.max(y.zero.unwrap_or(f64::MIN)));
@@ -152,18 +172,27 @@ impl Plot {
     }
 
     fn draw_legend(&self, area: &Area<'_>) -> Done {
-        let mut y = 48;
-        for (line, colour) in self.lines() {
-            area.draw(&Rectangle::new([(4, y - 4), (20, y + 4)], colour.filled()))?;
-            for text in textwrap::wrap(&line.name, LEGEND_LETTERS) {
-                let style = ("sans-serif", TEXT).into_font();
-                area.draw(&Text::new(text, (26, y - 7), style))?;
-                y += 18;
+        for (i, (colour, text)) in self.legend().into_iter().enumerate() {
+            let y = i as i32 * LEGEND_LINE as i32;
+            if let Some(colour) = colour {
+                area.draw(&Rectangle::new([(60, y + 6), (80, y + 16)], colour.filled()))?;
             }
-            y += 6;
+            area.draw(&Text::new(text, (90, y + 2), ("sans-serif", TEXT).into_font()))?;
         }
         Ok(())
     }
+}
+
+/// Returns true if the longest time would flatten some line on a linear axis.
+fn spans_much(lines: &[Line]) -> bool {
+    let median = |line: &Line| {
+        let mut positive: Vec<f64> = line.points.iter().map(|p| p.1).filter(|y| *y > 0.0).collect();
+        positive.sort_by(f64::total_cmp);
+        positive.get(positive.len() / 2).copied()
+    };
+    let shortest = lines.iter().filter_map(median).fold(f64::MAX, f64::min);
+    let longest = lines.iter().flat_map(|line| &line.points).map(|p| p.1).fold(0.0, f64::max);
+    longest > LINEAR_SPAN * shortest
 }
 
 /// One axis.
@@ -224,7 +253,7 @@ impl ValueFormatter<f64> for Axis {
         let rounded = (value * 1e12).round() / 1e12;
         match value.abs() {
             _ if self.zero.is_some_and(|zero| *value < 1.01 * zero) => "0".into(),
-            small if self.is_log && !(1e-3..1e6).contains(&small) => format!("{value:e}"),
+            small if self.is_log && !(1e-3..1e5).contains(&small) => format!("{value:e}"),
             _ => format!("{rounded}"),
         }
     }
@@ -259,6 +288,18 @@ mod tests {
         assert_eq!(axis.format_ext(&axis.zero.expect("a zero")), "0");
         assert!(axis.zero.is_some_and(|zero| zero < 1e-4 && zero > axis.low));
         assert!(drawn(&[]).contains("time, ns"));
+    }
+
+    #[test]
+    fn times_far_apart_have_a_logarithmic_axis() {
+        let plot = |other: f64| {
+            let lines = vec![Line::steps("pbig", [5.0, 0.0, 5.0]), Line::steps("parry 0.31", [9.0, other])];
+            Plot::steps("", lines)
+        };
+        assert!(plot(101.0).is_log_y && !plot(99.0).is_log_y && !plot(101.0).is_log);
+        assert!(!Plot::steps("", vec![]).is_log_y);
+        let [steps, times] = plot(101.0).axes();
+        assert!((steps.low, steps.zero) == (0.0, None) && times.zero.is_some());
     }
 
     #[test]
