@@ -22,6 +22,15 @@ tools=page/node_modules/.bin
 # The script that the module imports its device from.
 device=--alias:pbig-page-device=./page/web/device.js
 
+# timed TEXT COMMAND...: runs a command between two lines, of which the second says how long it took.
+timed() {
+    local text=$1 start=$SECONDS
+    shift
+    echo "== $text ..."
+    "$@"
+    echo "== $text: $((SECONDS - start)) s"
+}
+
 # check_folder: refuses a folder of other files than an earlier page's, because `bundle` deletes what is there.
 check_folder() {
     if [ ! -e "$out" ] || [ -f "$out/pbig_page_bg.wasm" ]; then return; fi
@@ -35,14 +44,14 @@ check_folder() {
 # has SIMD, and no unwinding. The program that writes the JavaScript is small: optimizing it would take longer than it runs.
 build_module() {
     local package=$1 folder=$2
-    RUSTFLAGS="-C target-feature=+simd128" step "${cargo[@]}" build --locked --profile wasm --lib --package "$package" \
+    RUSTFLAGS="-C target-feature=+simd128" timed "compile $package for browsers" "${cargo[@]}" build --locked --profile wasm --lib --package "$package" \
         --target "$target" --target-dir "$built/wasm"
-    step cargo run --quiet --locked --package pbig-page-bindgen -- "$built/wasm/$target/wasm/${package//-/_}.wasm" "$folder"
+    timed "write the JavaScript of $package" cargo run --locked --package pbig-page-bindgen -- "$built/wasm/$target/wasm/${package//-/_}.wasm" "$folder"
 }
 
 install_tools() {
     [ page/node_modules/.package-lock.json -nt page/package-lock.json ] ||
-        (cd page && step npm ci --no-audit --no-fund --ignore-scripts)
+        (cd page && timed "install the page's tools" npm ci --no-audit --no-fund --ignore-scripts)
 }
 
 # bundle: everything that a browser loads, and the licences of what it contains.
@@ -52,7 +61,7 @@ bundle() {
     # First, because `check_folder` looks for it, also after a bundle that failed.
     cp "$built"/bindings/pbig_page{,_gpu}_bg.wasm "$out"
     # Splitting: what several scripts need, and what is loaded later, becomes files of their own.
-    step "$tools/esbuild" page/web/{main,worker,measure-worker}.js page/web/style.css --bundle --splitting --minify --format=esm \
+    timed "bundle" "$tools/esbuild" page/web/{main,worker}.js page/web/style.css --bundle --splitting --minify --format=esm \
         --target=es2022 --log-level=warning --alias:pbig-page-module="$built/bindings/pbig_page.js" \
         --alias:pbig-page-gpu-module="$built/bindings/pbig_page_gpu.js" "$device" --outdir="$out"
     cp page/web/index.html page/web/start.js "$out"
@@ -65,11 +74,11 @@ bundle() {
 # test_page: the logic natively and in node, then the page in a browser, one test file after another; and the pairs of the native
 # program, with which the module's are compared.
 test_page() {
-    step cargo test --quiet --locked --release --package pbig-page
-    step cargo build --quiet --locked --release --package pbig-page --bin native_pairs
+    timed "test the Rust of the page" cargo test --quiet --locked --release --package pbig-page
+    timed "compile the native program" cargo build --quiet --locked --release --package pbig-page --bin native_pairs
     PAGE_FOLDER=$(cd "$out" && pwd) NATIVE_PAIRS=$built/release/native_pairs \
         CHROMIUM=$(command -v chromium) SHOTS=$PWD/out/page-shots \
-        step "$node" --test --test-reporter=spec --test-concurrency=1 page/tests/*.test.mjs
+        timed "test in node and Chromium" "$node" --test --test-reporter=spec --test-concurrency=1 page/tests/*.test.mjs
 }
 
 check_folder

@@ -40,7 +40,7 @@ impl FromStr for Choice {
 }
 
 /// Returns pbig's broad phase on a device that does every call.
-fn on_device(device: RemoteDevice) -> PbigBroadPhase {
+pub(crate) fn on_device(device: RemoteDevice) -> PbigBroadPhase {
     let config = PbigConfig { backend: Backend::Device, ..PbigConfig::DEFAULT };
     PbigBroadPhase::with_device(config, Box::new(device)).expect("the default margin is a length")
 }

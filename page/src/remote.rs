@@ -9,7 +9,7 @@ pub(crate) type FindAll = fn(&[Aabb], Option<&[ProxyFilter]>) -> Option<Vec<Pair
 /// A device that another module is, which finds all pairs in each call.
 #[derive(Clone, Debug)]
 pub(crate) struct RemoteDevice {
-    find_all: FindAll,
+    pub(crate) find_all: FindAll,
 }
 
 impl RemoteDevice {
@@ -40,7 +40,7 @@ impl PairDevice for RemoteDevice {
     }
 }
 
-/// Asks the page's GPU, and suspends the module until it answers. A failure ends the step with the GPU's error.
+/// Asks the page's GPU, and suspends the module until it answers. A GPU that fails has declined; `web/device.js` keeps the error.
 #[cfg(target_family = "wasm")]
 fn find_on_gpu(boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> Option<Vec<Pair>> {
     use wasm_bindgen::prelude::wasm_bindgen;

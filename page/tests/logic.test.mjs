@@ -4,10 +4,10 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Pace, STEP_MS } from "../web/pace.js";
 import { LEVELS, Quality } from "../web/quality.js";
+import { replayable, verdict, warmUpSettings } from "../web/replay.js";
 import { findMissing, hasModuleWorkers } from "../web/requirements.js";
 import { bodyChoices, formatSettings, parseSettings } from "../web/settings.js";
 import { Simulation, SimulationEnded } from "../web/simulation.js";
-import { csvOf, DIFFERENT, kernelsMs, median, rowOf, workOf } from "../web/measurement.js";
 import { findAdapter, gpuObstacle } from "../web/webgpu.js";
 import { formatMs, mean, p99, Times, WINDOW_STEPS } from "../web/times.js";
 
@@ -117,32 +117,29 @@ test("the end of a simulation is not a failure of its calls", async () => {
     await assert.rejects(ended, SimulationEnded);
 });
 
-/** Returns rounds with these times of the GPU, whose other times are 1 and whose bytes are their number. */
-function rounds(gpu) {
-    const times = { cpu_ms: 6, wait_ms: 1, upload_ms: 1, plan_ms: 0, record_ms: 1, decode_ms: 1 };
-    const bytesOf = (round) => ({ uploaded_bytes: round, downloaded_bytes: 1_234_567, device_bytes: 7 });
-    return gpu.map((gpu_ms, round) => ({ ...times, gpu_ms, ...bytesOf(round) }));
-}
-
-test("a row has the medians of the rounds and the bytes of the last", () => {
-    assert.deepEqual([median([3, 1, 2]), median([1, 2, 3, 4]), median([])], [2, 2.5, NaN]);
-    const row = rowOf({ boxes: 10, pairs: 5, rounds: rounds([2, 9, 3]), kernels: { scan: 1, check: 2 }, isEqual: true });
-    assert.deepEqual([row.gpu_ms, row.cpu_over_gpu, row.uploaded_bytes, row.pairs_equal], [3, 2, 2, "yes"]);
-    assert.equal(kernelsMs(row), 3);
-    assert.ok(Number.isNaN(kernelsMs({ kernels: {} })));
-    assert.equal(rowOf({ rounds: rounds([1]), kernels: {}, isEqual: false }).pairs_equal, DIFFERENT);
-    assert.equal(workOf([10_000, 1_000_000]), 9 * 10_000 + 6 * 1_000_000);
+test("a replay shows what works, and its verdict names the faster one", () => {
+    assert.deepEqual([replayable(), replayable("no WebGPU")], [["stock", "pbig", "gpu"], ["stock", "pbig"]]);
+    assert.deepEqual(warmUpSettings({ scene: "pile", bodies: 5000 }, "gpu"), { scene: "pile", bodies: 500, broadPhase: "gpu" });
+    const times = new Times();
+    const add = (broadPhase, ms) => times.add({ steps: 1, broadPhase, times: { broadPhase: ms, step: 9 } });
+    add("stock", 4);
+    add("pbig", 2);
+    assert.match(verdict(times), /same 300 steps, on this machine: pbig was faster than stock, 2.00 ms instead of 4.00\.$/);
+    add("gpu", 1);
+    assert.match(verdict(times), /; the GPU was faster than the CPU, 1.00 ms instead of 2.00\.$/);
+    add("gpu", 3.002);
+    assert.match(verdict(times), /; the CPU and the GPU both took 2.00 ms\.$/);
+    add("stock", 0.1);
+    add("pbig", 9);
+    assert.match(verdict(times), /: stock was faster than pbig, 2.05 ms instead of 5.50; the GPU was faster than the CPU/);
 });
 
-test("the CSV has conditions, exact counts, and a column for each kernel of any row", () => {
-    const row = (boxes, kernels) => rowOf({ boxes, pairs: 5, rounds: rounds([3.14159265]), kernels, isEqual: true });
-    const csv = csvOf({ adapter: "a GPU", software: false }, [row(10_000, {}), row(1_000_000, { scan: 0.5 })]);
-    const [first, second, columns, ...lines] = csv.trimEnd().split("\n");
-    assert.deepEqual([first, second], ["# adapter: a GPU", "# software: false"]);
-    const searches = "set,boxes,pairs,cpu_ms,gpu_ms,cpu_over_gpu,wait_ms,uploaded_bytes,downloaded_bytes,device_bytes,";
-    assert.ok(columns.startsWith(searches) && columns.endsWith(",pairs_equal,scan_ms"), columns);
-    assert.equal(lines[0], "uniform,10000,5,6,3.1416,1.9099,1,0,1234567,7,0.33333,1,0,1,1,yes,");
-    assert.ok(lines[1].startsWith("uniform,1000000,") && lines[1].endsWith(",yes,0.5"), lines[1]);
+test("times of the same steps stand side by side", () => {
+    const times = new Times();
+    for (const [broadPhase, ms] of [["stock", 3], ["pbig", 1]]) {
+        for (const steps of [1, 2]) times.add({ steps, broadPhase, times: { broadPhase: ms, step: ms } });
+    }
+    assert.deepEqual(times.columns("step"), [[1, 2], [3, 3], [1, 1], [null, null]]);
 });
 
 test("a browser without WebGPU is told why", async () => {

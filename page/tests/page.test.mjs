@@ -66,6 +66,42 @@ test("the page simulates 300 steps, and measures stock and pbig in one run", asy
     await page.close();
 });
 
+test("a replay shows the same steps with each broad phase, and says which was faster", async () => {
+    const page = await openScene("?scene=column&bodies=300");
+    await waitForSteps(page, 5);
+    await page.click("#replay");
+    for (const name of ["stock", "pbig"]) {
+        const isShown = (wanted) => location.search.includes(`broad-phase=${wanted}`);
+        await page.waitForFunction(isShown, {}, name);
+        await waitForSteps(page, STEPS / 2);
+    }
+    await page.waitForFunction(() => document.getElementById("verdict").textContent);
+    assert.match(await textOf(page, "#verdict"), /same 300 steps, on this machine: (stock|pbig)( was faster| and)/);
+    assert.equal(await numberOf(page, "#steps"), STEPS);
+    assert.equal(await textOf(page, "#pause"), "Run");
+    const times = await readTimes(page);
+    assert.ok(times["step mean"].stock > 0 && times["step mean"].pbig > 0);
+    await shoot(page, "replay");
+    await page.select("#scene", "pile");
+    await page.waitForFunction(() => document.getElementById("verdict").textContent === "");
+    // Chromium's own words about a browser without a GPU.
+    assert.deepEqual(page.complaints.filter((text) => text !== "No available adapters."), []);
+    await page.close();
+});
+
+test("the largest number of bodies runs", async () => {
+    const page = await openScene("?bodies=100");
+    await waitForSteps(page, 1);
+    const bodies = await page.$eval("#bodies option:last-child", ({ value }) => Number(value));
+    assert.equal(bodies, 100_000);
+    // Without pictures: graphics in software would take minutes.
+    const settings = { scene: "rain", bodies, seed: 1, broadPhase: "pbig" };
+    const [pairs] = await page.evaluate((s) => window.pbigPage.pairs(s, 1), settings);
+    assert.ok(pairs.length > 1000, `${pairs.length / 2} pairs`);
+    assert.deepEqual(page.complaints, []);
+    await page.close();
+});
+
 test("pause, step, reset, scene and bodies do what they say", async () => {
     const page = await openScene("?scene=pyramid&bodies=100");
     await waitForSteps(page, 5);

@@ -3,6 +3,7 @@
 let memory;
 let search;
 let pairs;
+let failure;
 
 /** Sets the memory of the simulation's module, and the function that returns a promise of the pairs of boxes and filters. */
 export function connect(moduleMemory, searchFunction) {
@@ -11,13 +12,26 @@ export function connect(moduleMemory, searchFunction) {
 
 async function find(boxes, filters, count) {
     const copy = (Type, at, numbers) => new Type(memory.buffer, at, numbers * count).slice();
-    pairs = await search(copy(Float32Array, boxes, 6), filters ? copy(Uint32Array, filters, 4) : undefined);
+    pairs = undefined;
+    try {
+        pairs = await search(copy(Float32Array, boxes, 6), filters ? copy(Uint32Array, filters, 4) : undefined);
+    } catch (error) {
+        // The CPU does the work, as if the GPU had declined it.
+        failure = error;
+    }
 }
 
 /** Suspends the calling module until the GPU has answered. */
 export const find_pairs = globalThis.WebAssembly?.Suspending ? new WebAssembly.Suspending(find) : () => {};
 
-/** Returns the pairs that were found last: ids, pair after pair. Nothing if the GPU declined. */
+/** Returns the pairs that were found last: ids, pair after pair. Nothing if the GPU declined, or failed. */
 export function take_pairs() {
     return pairs;
+}
+
+/** Returns the error of a search since the last call, if there was one. */
+export function takeFailure() {
+    const taken = failure;
+    failure = undefined;
+    return taken;
 }

@@ -1,9 +1,9 @@
 // Connects panel, simulation and stage.
 
-import { Measure } from "./measure.js";
 import { hideMessage, showMessage } from "./message.js";
 import { Pace, STEP_MS } from "./pace.js";
 import { Panel } from "./panel.js";
+import { replayable, REPLAY_STEPS, verdict, WARM_UP_STEPS, warmUpSettings } from "./replay.js";
 import { findMissing } from "./requirements.js";
 import { formatSettings, parseSettings } from "./settings.js";
 import { Simulation, SimulationEnded } from "./simulation.js";
@@ -26,7 +26,8 @@ class Page {
     #choice;
     #pace = new Pace();
     #isPaused = false;
-    #isHeld = false;
+    // Its `left` has the broad phases that the replay has yet to show, once it has warmed up. Undefined without a replay.
+    #replay;
     // True between a failure and the next reset.
     #hasFailed = false;
     // Each task waits for the one before it.
@@ -50,11 +51,6 @@ class Page {
         setInterval(() => this.#stepBetweenFrames(performance.now()), TIMER_MS);
     }
 
-    /** Stops world and drawing while the GPU is measured. They go on afterwards, the world unless it is paused. */
-    hold(isHeld) {
-        this.#isHeld = isHeld;
-    }
-
     /** Returns the pairs of a scene after each step, from a worker of its own. */
     async pairs(settings, steps) {
         const simulation = new Simulation();
@@ -71,6 +67,7 @@ class Page {
             pause: () => this.#pause(!this.#isPaused),
             step: () => this.#stepOnce(),
             reset: () => this.#build(),
+            replay: () => this.#startReplay(),
         };
     }
 
@@ -85,9 +82,13 @@ class Page {
         if (choice !== this.#choice) return; // There was a later one.
         this.#panel.showObstacle(obstacle);
         if (obstacle) return this.#showSettings();
+        this.#replay = undefined;
         this.#settings = { ...this.#settings, broadPhase };
         this.#showSettings();
-        this.#do(() => this.#simulation?.changeBroadPhase(broadPhase));
+        this.#do(async () => {
+            const failure = await this.#simulation?.changeBroadPhase(broadPhase);
+            if (failure) this.#goOnWithCpu(failure);
+        });
     }
 
     #pause(isPaused) {
@@ -108,16 +109,80 @@ class Page {
 
     #build() {
         if (this.#hasFailed) this.#dropSimulation();
+        this.#replay = undefined;
         showMessage("Loading…");
         this.#do(async () => {
             this.#simulation ??= await this.#load();
-            this.#times = new Times();
-            const frame = await this.#simulation.build(this.#settings);
-            this.#showSettings();
-            this.#show(frame);
-            this.#stage.lookAt(frame.scenery.movingBox);
-            hideMessage();
+            this.#clearTimes();
+            const { scenery } = await this.#buildScene();
+            this.#stage.lookAt(scenery.movingBox);
         });
+    }
+
+    async #buildScene() {
+        const frame = await this.#simulation.build(this.#settings);
+        if (frame.failure) this.#goOnWithCpu(frame.failure);
+        this.#showSettings();
+        this.#show(frame);
+        hideMessage();
+        return frame;
+    }
+
+    #clearTimes() {
+        this.#times = new Times();
+        this.#panel.showVerdict();
+    }
+
+    // The worker has changed the broad phase already.
+    #goOnWithCpu(reason) {
+        this.#replay = undefined;
+        this.#settings = { ...this.#settings, broadPhase: "pbig" };
+        this.#showSettings();
+        this.#panel.showObstacle(`${reason} The CPU goes on.`);
+    }
+
+    /** Shows the scene from its start with each broad phase in turn. */
+    #startReplay() {
+        if (this.#hasFailed) return;
+        const replay = (this.#replay = {});
+        showMessage("Warming up…");
+        this.#do(async () => {
+            const names = await this.#warmUp();
+            hideMessage();
+            if (replay !== this.#replay) return; // It was given up.
+            replay.left = names;
+            this.#clearTimes();
+            await this.#replayNext();
+            this.#pause(false);
+        });
+    }
+
+    /** Returns the broad phases that a replay can show. */
+    async #warmUp() {
+        const names = [];
+        for (const name of replayable(await gpuObstacle())) {
+            try {
+                await this.#simulation.pairs(warmUpSettings(this.#settings, name), WARM_UP_STEPS);
+                names.push(name);
+            } catch (error) {
+                if (name !== "gpu") throw error;
+                this.#panel.showObstacle(error.message);
+            }
+        }
+        return names;
+    }
+
+    async #replayNext() {
+        const broadPhase = this.#replay.left.shift();
+        if (!broadPhase) return this.#endReplay();
+        this.#settings = { ...this.#settings, broadPhase };
+        await this.#buildScene();
+    }
+
+    #endReplay() {
+        this.#replay = undefined;
+        this.#pause(true);
+        this.#panel.showVerdict(verdict(this.#times));
     }
 
     // A module that trapped cannot be used again.
@@ -142,8 +207,10 @@ class Page {
         // The simulation may have been dropped since this step was due.
         if (!this.#simulation) return;
         const frame = await this.#simulation.step();
-        this.#times.add(frame);
+        if (frame.failure) this.#goOnWithCpu(frame.failure);
+        else this.#times.add(frame);
         this.#show(frame);
+        if (this.#replay?.left && frame.steps >= REPLAY_STEPS) await this.#replayNext();
     }
 
     #show(frame) {
@@ -161,7 +228,7 @@ class Page {
     #frame(now) {
         this.#lastFrame = now;
         this.#stepIfDue(now);
-        if (!this.#isHeld || this.#stage.isOutdated) this.#stage.draw(now);
+        this.#stage.draw(now);
         requestAnimationFrame((next) => this.#frame(next));
     }
 
@@ -171,7 +238,7 @@ class Page {
     }
 
     #stepIfDue(now) {
-        if (this.#isPaused || this.#isHeld || this.#isStepping || this.#hasFailed || !this.#pace.takeStep(now)) return;
+        if (this.#isPaused || this.#isStepping || this.#hasFailed || !this.#pace.takeStep(now)) return;
         this.#isStepping = true;
         this.#do(() => this.#step()).then(() => (this.#isStepping = false));
     }
@@ -196,7 +263,6 @@ function clockResolution() {
 }
 
 const page = new Page();
-const measure = new Measure((isPaused) => page.hold(isPaused));
-// For tests: the pairs of any scene, step by step, and the numbers of boxes of a measurement.
-window.pbigPage = { pairs: (settings, steps) => page.pairs(settings, steps), measure };
+// For tests: the pairs of any scene, step by step.
+window.pbigPage = { pairs: (settings, steps) => page.pairs(settings, steps) };
 page.start();

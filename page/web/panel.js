@@ -17,13 +17,14 @@ export class Panel {
         step: createChart(element("chart-step")),
     };
 
-    constructor({ change, changeBroadPhase, pause, step, reset }) {
+    constructor({ change, changeBroadPhase, pause, step, reset, replay }) {
         element("scene").onchange = ({ target }) => change({ scene: target.value });
         element("bodies").onchange = ({ target }) => change({ bodies: Number(target.value) });
         element("broad-phase").onchange = ({ target }) => changeBroadPhase(target.value);
         element("pause").onclick = pause;
         element("step").onclick = step;
         element("reset").onclick = reset;
+        element("replay").onclick = replay;
         element("controls").onsubmit = (event) => event.preventDefault();
     }
 
@@ -34,12 +35,17 @@ export class Panel {
         // Empty if there is no such scene.
         element("scene").value = scene;
         this.#scenes = scenes;
-        for (const control of document.querySelectorAll("#controls :disabled")) control.disabled = false;
+        for (const control of document.querySelectorAll("#panel :disabled")) control.disabled = false;
     }
 
     /** Shows why the GPU cannot be chosen. */
     showObstacle(reason = "") {
         element("obstacle").textContent = reason;
+    }
+
+    /** Shows which broad phase was faster in a replay. */
+    showVerdict(text = "") {
+        element("verdict").textContent = text;
     }
 
     /** Shows which settings are chosen. */

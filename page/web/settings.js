@@ -1,6 +1,6 @@
 // The scene that the page shows. The address has it, so that a link shows the same.
 
-export const BODY_COUNTS = [100, 500, 1000, 2000, 5000, 10000, 20000];
+export const BODY_COUNTS = [100, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000];
 export const BROAD_PHASES = ["stock", "pbig", "gpu"];
 const MAX_BODIES = 100_000;
 const MAX_SEED = 0xffffffff;

@@ -25,12 +25,12 @@ export class Simulation {
         return this.#call("build", settings);
     }
 
-    /** Advances by one step, and returns the frame. */
+    /** Advances by one step, and returns the frame. Its `failure` says why the GPU failed; then the CPU goes on. */
     step() {
         return this.#call("step");
     }
 
-    /** Changes the broad phase of the running world. */
+    /** Changes the broad phase of the running world. Returns why the GPU could not be opened; then the CPU goes on. */
     changeBroadPhase(name) {
         return this.#call("changeBroadPhase", name);
     }

@@ -10,7 +10,10 @@ const MATRIX_FLOATS = 16;
 // Shadows draw every part twice.
 const MAX_PARTS_WITH_SHADOWS = 4000;
 const VIEW_DIRECTION = new THREE.Vector3(0.75, 0.45, 1).normalize();
-const SUN_DIRECTION = new THREE.Vector3(0.5, 1, 0.35).normalize();
+// Things fall and spread: room for that.
+const ROOM = 1.5;
+// From the right, so that shadows lie where the camera sees them.
+const SUN_DIRECTION = new THREE.Vector3(0.75, 1, -0.2).normalize();
 const SHADOW_MAP_SIZE = 2048;
 
 /** The canvas with the shapes, the camera and the lights. */
@@ -23,8 +26,6 @@ export class Stage {
     #sky = new THREE.HemisphereLight(0xffffff, 0x8088a0, 1.4);
     #shapes = [];
     #quality = new Quality();
-    /** True if the canvas does not show the last scenery, size and scheme. */
-    isOutdated = true;
 
     /** Throws if the canvas has no WebGL. */
     constructor(canvas, onContextLost) {
@@ -67,8 +68,8 @@ export class Stage {
     lookAt([x, y, z, halfX, halfY, halfZ]) {
         const radius = Math.max(Math.hypot(halfX, halfY, halfZ), 1);
         // Things fall: the ground below is as interesting as the place they start from.
-        const target = new THREE.Vector3(x, y - 0.4 * halfY, z);
-        const distance = radius / Math.sin(this.#narrowAngle() / 2);
+        const target = new THREE.Vector3(x, y - 0.6 * halfY, z);
+        const distance = (ROOM * radius) / Math.sin(this.#narrowAngle() / 2);
         this.#orbit.target.copy(target);
         this.#camera.position.copy(target).addScaledVector(VIEW_DIRECTION, distance);
         this.#camera.near = distance / 200;
@@ -82,7 +83,6 @@ export class Stage {
     /** Draws the shapes at their places, at this time in milliseconds. */
     draw(now) {
         if (this.#quality.noteFrame(now)) this.#applyQuality();
-        this.isOutdated = false;
         this.#orbit.update();
         this.#renderer.render(this.#scene, this.#camera);
     }
@@ -105,7 +105,6 @@ export class Stage {
     #fitCanvas() {
         const { clientWidth, clientHeight } = this.#renderer.domElement.parentElement;
         this.#renderer.setSize(clientWidth, clientHeight, false);
-        this.isOutdated = true;
         this.#camera.aspect = clientWidth / Math.max(clientHeight, 1);
         this.#camera.updateProjectionMatrix();
     }
@@ -124,7 +123,6 @@ export class Stage {
         this.#scene.background = sky;
         this.#scene.fog.color.copy(sky);
         this.#shapes.forEach(({ mesh, classes }) => colourInstances(mesh, classes));
-        this.isOutdated = true;
     }
 
     #discard(mesh) {

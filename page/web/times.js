@@ -20,15 +20,13 @@ const FIGURES = { mean, p99 };
 
 /** The last steps: `{ steps, broadPhase, times: { broadPhase, step } }`, times in milliseconds. */
 export class Times {
-    #all = [];
     #byBroadPhase = Object.fromEntries(BROAD_PHASES.map((name) => [name, []]));
 
     /** Adds a step, and drops those that left the window. */
     add(entry) {
-        for (const list of [this.#all, this.#byBroadPhase[entry.broadPhase]]) {
-            list.push(entry);
-            if (list.length > WINDOW_STEPS) list.shift();
-        }
+        const list = this.#byBroadPhase[entry.broadPhase];
+        list.push(entry);
+        if (list.length > WINDOW_STEPS) list.shift();
     }
 
     /** Returns the `mean` or `p99` of a time over the last steps with a broad phase; NaN without any. */
@@ -36,11 +34,16 @@ export class Times {
         return FIGURES[figure](this.#byBroadPhase[broadPhase].map(({ times }) => times[time]));
     }
 
-    /** Returns the columns of a chart: numbers of steps, and a time with each broad phase, null where another one ran. */
+    /** Returns the columns of a chart: the numbers of the last steps, and a time with each broad phase, null where it did not run. */
     columns(time) {
-        const of = (name) =>
-            this.#all.map(({ broadPhase, times }) => (broadPhase === name ? times[time] : null));
-        return [this.#all.map(({ steps }) => steps), ...BROAD_PHASES.map(of)];
+        const lists = Object.values(this.#byBroadPhase);
+        const numbers = lists.flat().map(({ steps }) => steps).sort((a, b) => a - b);
+        const shown = [...new Set(numbers)].slice(-WINDOW_STEPS);
+        const column = (list) => {
+            const byStep = new Map(list.map(({ steps, times }) => [steps, times[time]]));
+            return shown.map((step) => byStep.get(step) ?? null);
+        };
+        return [shown, ...lists.map(column)];
     }
 }
 

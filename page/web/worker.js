@@ -1,6 +1,6 @@
 // Steps the world apart from the page, which stays responsive while a step takes long.
 
-import { connect } from "./device.js";
+import { connect, takeFailure } from "./device.js";
 import { describe, loadModule } from "./load.js";
 import init, { Simulation, panic_message, scenes } from "pbig-page-module";
 
@@ -22,40 +22,71 @@ const methods = {
     },
 
     async build(settings) {
-        await prepare(settings.broadPhase);
+        const failure = await openGpuFor(settings.broadPhase);
+        broadPhase = failure ? "pbig" : settings.broadPhase;
         simulation?.free();
-        simulation = create(settings);
-        broadPhase = settings.broadPhase;
-        return { ...readScenery(), ...readFrame() };
+        simulation = create({ ...settings, broadPhase });
+        return { ...readScenery(), ...readFrame(), failure };
     },
 
     async step() {
-        const isNewScenery = await advance(simulation, broadPhase);
-        return { ...(isNewScenery && readScenery()), ...readFrame() };
+        const used = broadPhase;
+        const isNewScenery = await advance(simulation, used);
+        const failure = takeGpuFailure();
+        if (failure) change("pbig");
+        return { ...(isNewScenery && readScenery()), ...readFrame(), broadPhase: used, failure };
     },
 
+    /** Returns why the GPU could not be opened; then the broad phase is pbig's on the CPU. */
     async changeBroadPhase(name) {
-        await prepare(name);
-        simulation.change_broad_phase(name);
-        broadPhase = name;
+        const failure = await openGpuFor(name);
+        change(failure ? "pbig" : name);
+        return failure;
     },
 
     async pairs(settings, steps) {
-        await prepare(settings.broadPhase);
+        failIf(await openGpuFor(settings.broadPhase));
         const [apart, pairs] = [create(settings), []];
         for (let step = 0; step < steps; step++) {
             await advance(apart, settings.broadPhase);
+            failIf(takeGpuFailure());
             pairs.push(apart.pairs());
         }
+        apart.free();
         return pairs;
     },
 };
 
-/** Opens the GPU where it is needed. Its module is loaded only then. */
-async function prepare(name) {
-    if (name !== "gpu" || findOnGpu) return;
-    const { openGpu } = await import("./gpu.js");
-    findOnGpu = await openGpu();
+/** Opens the GPU where it is needed. Its module is loaded only then. Returns the reason if that fails. */
+async function openGpuFor(name) {
+    if (name !== "gpu" || findOnGpu) return undefined;
+    try {
+        const { openGpu } = await import("./gpu.js");
+        findOnGpu = await openGpu();
+    } catch (error) {
+        return firstLine(error);
+    }
+}
+
+/** Returns the first line of an error. The lines below it, in some browsers, say where in the module it came from. */
+function firstLine(error) {
+    return error.message.split("\n")[0];
+}
+
+function change(name) {
+    simulation.change_broad_phase(name);
+    broadPhase = name;
+}
+
+/** Returns why the GPU failed since the last call, if it did. It is opened again when it is chosen again. */
+function takeGpuFailure() {
+    const failure = takeFailure();
+    if (failure) findOnGpu = undefined;
+    return failure && firstLine(failure);
+}
+
+function failIf(reason) {
+    if (reason) throw new Error(reason);
 }
 
 async function advance(world, name) {

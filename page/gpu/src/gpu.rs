@@ -1,14 +1,15 @@
 //! The GPU as the simulation uses it.
 
-use crate::device::{Device, failure, find};
+use crate::to_js;
 use bytemuck::cast_slice;
 use pbig_core::{DeviceFailure, DeviceFound, SearchRequest};
+use pbig_gpu::GpuFinder;
 use wasm_bindgen::prelude::*;
 
 /// An open GPU.
 #[wasm_bindgen]
 pub struct Gpu {
-    device: Device,
+    finder: GpuFinder,
     found: DeviceFound,
 }
 
@@ -19,7 +20,8 @@ impl Gpu {
     /// # Errors
     /// If there is no adapter, or if it refuses a device.
     pub async fn open() -> Result<Self, JsError> {
-        Ok(Self { device: Device::open().await?, found: DeviceFound::default() })
+        let finder = GpuFinder::open_async().await.map_err(to_js)?;
+        Ok(Self { finder, found: DeviceFound::default() })
     }
 
     /// Returns the pairs of boxes that their filters allow, as two ids a pair. A box is six numbers, `min` and `max`. A filter is four
@@ -35,10 +37,18 @@ impl Gpu {
         let filters = filters.as_deref().map(cast_slice);
         let request =
             SearchRequest { boxes: cast_slice(&boxes), filters, is_sorted: true, max_pairs: u64::MAX };
-        match find(&mut self.device.finder, &request, &mut self.found).await {
-            Ok(()) => Ok(Some(cast_slice(&self.found.pairs).to_vec())),
+        match self.finder.find_all_async(&request, &mut self.found).await {
+            Ok(()) => Ok(Some(self.sorted_pairs())),
             Err(DeviceFailure::Declined(_)) => Ok(None),
-            Err(other) => Err(failure(other)),
+            Err(DeviceFailure::Failed(reason)) => Err(to_js(reason)),
+            Err(DeviceFailure::TooManyPairs) => Err(to_js("there are too many pairs")),
         }
+    }
+
+    fn sorted_pairs(&mut self) -> Vec<u32> {
+        if !self.found.pairs.is_sorted() {
+            self.found.pairs.sort_unstable();
+        }
+        cast_slice(&self.found.pairs).to_vec()
     }
 }

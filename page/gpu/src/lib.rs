@@ -1,11 +1,8 @@
-//! pbig on the GPU of a browser: all pairs of given boxes, and the measurement beside the CPU; for tests, the corpus. JavaScript calls
-//! everything here.
+//! pbig on the GPU of a browser: all pairs of given boxes; for tests, the corpus. JavaScript calls everything here.
 
-mod benchmark;
 mod clock;
 #[cfg(feature = "corpus")]
 pub mod corpus;
-mod device;
 mod gpu;
 
 use std::sync::{Mutex, PoisonError};
