@@ -138,7 +138,7 @@ class Page {
         this.#replay = undefined;
         this.#settings = { ...this.#settings, broadPhase: "pbig" };
         this.#showSettings();
-        this.#panel.showObstacle(`${reason} The CPU goes on.`);
+        this.#panel.showObstacle(`The CPU goes on: ${reason}`);
     }
 
     /** Shows the scene from its start with each broad phase in turn. */
