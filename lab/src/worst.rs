@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn a_search_finds_worse_worlds_than_it_begins_with() {
         let of = |seconds: u64| {
-            let report = run(Search { seconds, seed: 1, boxes: 400 }).expect("a search");
+            let report = run(Search { seconds, seed: 1, boxes: 1000 }).expect("a search");
             report.tables[0].numbers("ratio")
         };
         let (start, end) = (of(0), of(2));

@@ -64,19 +64,17 @@ fn steady_has_every_motion() {
 #[test]
 fn papers_have_every_table_and_counts_fit_what_is_expected() {
     let report = papers::run(true).expect("all ways agree");
-    assert_eq!(report.tables.len(), 12);
+    assert_eq!(report.tables.len(), 11);
     // A device's tables are empty without one.
     assert!(report.tables.iter().all(|table| !table.rows.is_empty() || table.name.contains("GPU")));
     for name in ["PBIG figure 8", "PBIG figure 11"] {
         let off = table(&report, name).numbers("off, standard deviations");
         assert!(off.into_iter().map(f64::abs).fold(0.0, f64::max) < 5.0, "{name}");
     }
-    // Plain pairs are eight bytes each, as written; and never less are fetched.
+    // A pair is eight bytes.
     let switches = table(&report, "PBIG table IV: ");
     for row in &switches.rows {
         let of = |column: &str| switches.number(row, column);
-        assert!(of("bytes fetched") >= of("bytes written"), "{row:?}");
-        let is_plain = of("bytes written") == of("pairs").map(|pairs| 8.0 * pairs);
-        assert!(row[0].as_str().is_some_and(|name| name.contains('C')) || is_plain, "{row:?}");
+        assert!(of("bytes fetched") >= of("pairs").map(|pairs| 8.0 * pairs), "{row:?}");
     }
 }
