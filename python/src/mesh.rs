@@ -6,12 +6,21 @@ use rayon::prelude::*;
 /// Two kinds of elements: `v` for vertices, `e` for edges or `f` for faces.
 pub(crate) type KindPair = [char; 2];
 
+/// Maximum number of vertices, for each face, that are counted: beyond, sorting takes less time and memory.
+const MAX_VERTICES_PER_FACE: usize = 32;
+
+/// Minimum number of boxes that a thread makes.
+const BOXES_OF_THREAD: usize = 4096;
+
 /// Pairs of indices.
 type Pairs = Vec<[u32; 2]>;
 
 /// Returns the edges of faces, each once: larger and then smaller vertex, sorted. The program `pbig` has the same rule.
 pub(crate) fn edges(faces: &[Keys]) -> Pairs {
     let vertices = sides(faces).map(|[larger, _]| larger as usize + 1).max().unwrap_or(0);
+    if vertices > MAX_VERTICES_PER_FACE * faces.len() {
+        return sorted_edges(faces);
+    }
     // By larger vertex: where its smaller ones begin; once they are written, where they end.
     let mut next = vec![0; vertices + 1];
     sides(faces).for_each(|[larger, _]| next[larger as usize + 1] += 1);
@@ -32,6 +41,14 @@ pub(crate) fn edges(faces: &[Keys]) -> Pairs {
     edges
 }
 
+/// As [`edges`], in time that does not follow the number of vertices.
+fn sorted_edges(faces: &[Keys]) -> Pairs {
+    let mut edges: Pairs = sides(faces).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
 /// Yields the sides of faces, larger vertex first. None is from a vertex to itself.
 fn sides(faces: &[Keys]) -> impl Iterator<Item = [u32; 2]> {
     let sides = faces.iter().flat_map(|face| {
@@ -49,7 +66,12 @@ pub(crate) struct Mesh<'a> {
 
 impl<'a> Mesh<'a> {
     pub(crate) fn new([from, to]: [&[[f64; 3]]; 2], faces: &'a [Keys], margin: f64) -> Self {
-        let vertices = from.par_iter().zip(to).map(|(from, to)| swept(from, to, margin)).collect();
+        let vertices = from
+            .par_iter()
+            .zip(to)
+            .with_min_len(BOXES_OF_THREAD)
+            .map(|(from, to)| swept(from, to, margin))
+            .collect();
         Self { vertices, faces }
     }
 
@@ -72,7 +94,8 @@ impl<'a> Mesh<'a> {
             'e' => edges(self.faces).into_iter().map(|[v, w]| [v, w, NO_KEY, NO_KEY]).collect(),
             _ => self.faces.to_vec(),
         };
-        Elements { boxes: keys.par_iter().map(|keys| self.around(keys)).collect(), keys }
+        let corners = keys.par_iter().with_min_len(BOXES_OF_THREAD);
+        Elements { boxes: corners.map(|keys| self.around(keys)).collect(), keys }
     }
 
     /// Returns the box around some vertices; invalid if one of theirs is.

@@ -85,5 +85,5 @@ fn rounds() {
 #[test]
 fn look_ups_make_the_events_of_a_full_search_on_any_threads() {
     rounds();
-    [1, 2, 3].into_iter().for_each(|threads| on_threads(threads, rounds));
+    [1, 2, 3, 16].into_iter().for_each(|threads| on_threads(threads, rounds));
 }

@@ -240,7 +240,8 @@ impl Finder {
     }
 
     /// Returns the list of the last call that lists pairs of one set, without a copy.
-    pub fn into_pairs(self) -> Vec<Pair> {
+    pub fn into_pairs(mut self) -> Vec<Pair> {
+        self.pairs.shrink_to_fit();
         self.pairs
     }
 

@@ -90,7 +90,7 @@ pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};
 pub use pair::{CrossPair, Pair};
 pub use pair_device::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
-pub use pair_list::{BoxIds, PairList};
+pub use pair_list::PairList;
 pub use policy::NoDevice;
 pub use report::{Checks, DeviceReport, Report, StageTimes, WORK_LIMIT};
 pub use simd::simd;

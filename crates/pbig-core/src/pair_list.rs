@@ -21,25 +21,6 @@ pub struct PairList {
     checked: Check,
 }
 
-/// The boxes that appended pairs name.
-#[derive(Clone, Copy, Debug)]
-pub enum BoxIds<'a> {
-    /// The first boxes of the request, this many.
-    First(u32),
-    /// A part of the request: its box `i` has this id.
-    Part(&'a [u32]),
-}
-
-impl BoxIds<'_> {
-    /// Returns the number of boxes.
-    pub fn boxes(&self) -> u32 {
-        match self {
-            Self::First(boxes) => *boxes,
-            Self::Part(ids) => ids.len() as u32,
-        }
-    }
-}
-
 /// The outcome of checks of the first pairs of a list.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Check {
@@ -51,12 +32,12 @@ struct Check {
 }
 
 impl PairList {
-    /// Appends pairs, and checks them on the way. Each is read once: they may lie in memory of a device, which is slow to read.
-    /// Threads share the work.
+    /// Appends pairs of this number of boxes, and checks them on the way. Each is read once: they may lie in memory of a device, which
+    /// is slow to read. Threads share the work.
     ///
     /// # Errors
     /// The index of a pair `(a, b)` that is not `a < b`, or that names no box. Then nothing was appended.
-    pub fn append_checked(&mut self, pairs: &[Pair], ids: BoxIds<'_>) -> Result<(), usize> {
+    pub fn append_checked(&mut self, pairs: &[Pair], boxes: u32) -> Result<(), usize> {
         let (start, len) = (self.pairs.len(), pairs.len());
         self.pairs.reserve(len);
         let room = SharedSlice::new(&mut self.pairs.spare_capacity_mut()[..len]);
@@ -64,7 +45,7 @@ impl PairList {
             let range = piece * PIECE..len.min((piece + 1) * PIECE);
             // SAFETY: the range is inside the room, and no other piece has it.
             let room = unsafe { room.part(range.clone()) };
-            copy_checked(room, &pairs[range.clone()], ids).map_err(|fault| range.start + fault)
+            copy_checked(room, &pairs[range.clone()], boxes).map_err(|fault| range.start + fault)
         });
         let checks: Vec<Check> = checks.into_iter().collect::<Result<_, usize>>()?;
         // SAFETY: each piece was copied.
@@ -145,29 +126,21 @@ impl Check {
 }
 
 /// Copies pairs, and checks each block of them while it is in the cache. Returns the index of a fault.
-fn copy_checked(to: &mut [MaybeUninit<Pair>], pairs: &[Pair], ids: BoxIds<'_>) -> Result<Check, usize> {
+fn copy_checked(to: &mut [MaybeUninit<Pair>], pairs: &[Pair], boxes: u32) -> Result<Check, usize> {
     let (mut all, mut last) = (Check::default(), None);
     for (room, pairs) in to.chunks_mut(BLOCK).zip(pairs.chunks(BLOCK)) {
+        let room = &mut room[..pairs.len()];
         room.iter_mut().zip(pairs).for_each(|(to, pair)| _ = to.write(*pair));
         // SAFETY: each was written; a `MaybeUninit` has the layout of what it holds.
-        let block = unsafe { std::slice::from_raw_parts_mut(room.as_mut_ptr().cast::<Pair>(), room.len()) };
-        let check = check_and_name(block, ids).map_err(|fault| all.len + fault)?;
-        all = all.before(check, last.as_ref() < block.first());
+        let block = unsafe { std::slice::from_raw_parts(room.as_ptr().cast::<Pair>(), room.len()) };
+        let is_right = |pair: &Pair| pair.a < pair.b && pair.b < boxes;
+        let check = check_of(block).filter(|check| check.end <= boxes);
+        let check =
+            check.ok_or_else(|| all.len + block.iter().position(|pair| !is_right(pair)).unwrap_or(0))?;
+        all = all.before(check, last < block.first().copied());
         last = block.last().copied();
     }
     Ok(all)
-}
-
-/// Checks pairs, and gives their boxes the ids of the request. Returns the index of a fault.
-fn check_and_name(pairs: &mut [Pair], ids: BoxIds<'_>) -> Result<Check, usize> {
-    let boxes = ids.boxes();
-    let fault = |pairs: &[Pair]| pairs.iter().position(|pair| pair.a >= pair.b || pair.b >= boxes);
-    let check = check_of(pairs).filter(|check| check.end <= boxes);
-    let (Some(_), BoxIds::Part(ids)) = (check, ids) else {
-        return check.ok_or_else(|| fault(pairs).unwrap_or(0));
-    };
-    pairs.iter_mut().for_each(|pair| *pair = Pair::new(ids[pair.a as usize], ids[pair.b as usize]));
-    check_of(pairs).ok_or(0)
 }
 
 /// Checks pairs. Returns none if one is not `a < b`.
@@ -207,7 +180,7 @@ mod tests {
                 let mut faulty = pairs.clone();
                 faulty[at] = fault;
                 let mut list = PairList::from(vec![Pair { a: 0, b: 1 }]);
-                assert_eq!(list.append_checked(&faulty, BoxIds::First(boxes)), Err(at), "{fault:?}");
+                assert_eq!(list.append_checked(&faulty, boxes), Err(at), "{fault:?}");
                 assert_eq!(list.len(), 1);
                 *list = faulty;
                 assert!(!list.names_only(boxes as usize), "{fault:?} at {at}");
@@ -226,7 +199,7 @@ mod tests {
             twice[at] = twice[at + 1];
             for disordered in [swapped, twice] {
                 let mut list = PairList::default();
-                list.append_checked(&disordered, BoxIds::First(boxes)).expect("pairs");
+                list.append_checked(&disordered, boxes).expect("pairs");
                 assert!(list.names_only(boxes as usize) && !list.is_in_order(), "copied, {at}");
                 let mut list = PairList::from(disordered);
                 assert!(list.names_only(boxes as usize) && !list.is_in_order(), "in place, {at}");
@@ -239,25 +212,27 @@ mod tests {
     #[test]
     fn a_changed_list_is_checked_again() {
         let mut list = PairList::default();
-        list.append_checked(&many(), BoxIds::First(u32::MAX)).expect("pairs");
+        list.append_checked(&many(), u32::MAX).expect("pairs");
         list[7].b = list[7].a;
         assert!(!list.names_only(usize::MAX));
         list[7].b += 1;
         assert!(list.names_only(usize::MAX));
         // An unchecked beginning is not forgotten.
         list[7].b = list[7].a;
-        list.append_checked(&many(), BoxIds::First(u32::MAX)).expect("pairs");
+        list.append_checked(&many(), u32::MAX).expect("pairs");
         assert!(!list.names_only(usize::MAX));
     }
 
     #[test]
-    fn pairs_of_a_part_get_the_ids_of_the_request() {
-        let mut list = PairList::default();
-        let of_part = [Pair { a: 0, b: 1 }, Pair { a: 1, b: 2 }];
-        list.append_checked(&of_part, BoxIds::Part(&[7, 3, 9])).expect("three boxes");
-        assert_eq!(*list, [Pair { a: 3, b: 7 }, Pair { a: 3, b: 9 }]);
-        assert!(list.names_only(10) && !list.names_only(9));
-        assert_eq!(list.append_checked(&of_part, BoxIds::Part(&[7, 3])), Err(1), "no third box");
-        assert_eq!(list.append_checked(&of_part, BoxIds::Part(&[7, 7, 7])), Err(0), "a box with itself");
+    fn parts_are_in_order_together_if_their_border_is() {
+        let pairs = many();
+        let (first, second) = pairs.split_at(PIECE + 5);
+        for (parts, is_in_order) in
+            [([first, second], true), ([second, first], false), ([first, first], false)]
+        {
+            let mut list = PairList::default();
+            parts.iter().for_each(|part| list.append_checked(part, end_of(&pairs)).expect("pairs"));
+            assert_eq!(list.is_in_order(), is_in_order);
+        }
     }
 }

@@ -271,6 +271,22 @@ fn random_worlds_on_a_gpu_have_the_bits_of_the_cpu() {
 }
 
 #[test]
+fn a_snapshot_anywhere_continues_bit_identically() {
+    let config = on_cpu()[0];
+    let tally = on_random_ops(20, |ops| {
+        // A fresh broad phase has other fat boxes than one that was there all along, so other pairs.
+        let saved =
+            |op: &Op| if matches!(op.act, Act::Fresh) { Op { act: Act::Snapshot, ..*op } } else { *op };
+        let ops: Vec<Op> = ops.iter().map(saved).collect();
+        let kept: Vec<Op> = ops.iter().copied().filter(|op| !matches!(op.act, Act::Snapshot)).collect();
+        let with = run(&ops, config)?;
+        with.compare(&run(&kept, config)?)?;
+        Ok(with)
+    });
+    tally.assert_that_much_happened();
+}
+
+#[test]
 fn a_planted_fault_is_noticed_and_shrinks_to_a_few_operations() {
     let failing = |ops: &[Op]| run_with(ops, on_cpu()[0].into(), true).map(|_| ());
     let (why, ops) = try_random_ops(100, &failing).expect_err("the fault is noticed");

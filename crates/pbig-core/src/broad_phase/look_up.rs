@@ -32,7 +32,7 @@ impl LookUp {
         };
         index.in_order(&world.changed, &mut self.order);
         task.kept.make_backward();
-        drop_pairs_of_removed(&world.removed, task.kept);
+        drop_pairs_of_removed(&world.removed, task.kept, &mut task.events.removed);
         task.report.stages.map += clock.lap();
         stage!("check");
         let is_forced = task.config.engine == Some(Engine::LookUp);
@@ -87,16 +87,17 @@ impl LookUp {
     }
 }
 
-/// Drops the kept pairs of removed boxes, which end without an event.
-fn drop_pairs_of_removed(removed: &[u32], kept: &mut Kept) {
+/// Drops the kept pairs of removed boxes, which end without an event. Lists them in a buffer.
+fn drop_pairs_of_removed(removed: &[u32], kept: &mut Kept, dropped: &mut Vec<Pair>) {
     let partners = |id: u32| {
         let (lower, later) = kept.rows_of(id);
         lower.iter().chain(later).map(move |&other| Pair::new(id, other))
     };
-    let mut dropped: Vec<Pair> = removed.iter().flat_map(|id| partners(*id)).collect();
+    dropped.clear();
+    dropped.extend(removed.iter().flat_map(|id| partners(*id)));
     dropped.sort_unstable();
     dropped.dedup();
-    kept.apply(&[], &dropped);
+    kept.apply(&[], dropped);
 }
 
 /// The findings and buffers of one thread.

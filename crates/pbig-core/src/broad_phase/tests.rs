@@ -91,6 +91,20 @@ fn finders_and_broad_phases_can_be_sent_and_shared() {
     is_send_and_sync::<crate::Finder>();
 }
 
+#[test]
+fn pairs_of_a_removed_box_end_for_the_other_in_a_search() {
+    let mut broad_phase = BroadPhase::default();
+    let at = |i: u32, x: f32| Aabb::from_center([0.9 * i as f32 + x, 0.0, 0.0], [0.5; 3]);
+    (0..3000).for_each(|i| broad_phase.set(3 * i, at(i, 0.0), ProxyFilter::ALL).expect("few boxes"));
+    broad_phase.update().expect("few pairs");
+    assert!(broad_phase.pairs_of(3).eq([Pair { a: 0, b: 3 }, Pair { a: 3, b: 6 }]));
+    assert!(broad_phase.remove(0));
+    (1..3000).for_each(|i| assert!(broad_phase.set_aabb(3 * i, at(i, 0.01))));
+    broad_phase.update().expect("few pairs");
+    assert_eq!(broad_phase.report().plan.algorithm, Algorithm::Grid);
+    assert!(broad_phase.pairs_of(3).eq([Pair { a: 3, b: 6 }]));
+}
+
 /// Boxes of one body, of which some grow as large as the world.
 #[test]
 fn look_ups_given_up_cost_at_most_64_tests_a_box() {

@@ -46,7 +46,17 @@ impl Finder {
     }
 
     /// Returns the list of the last call of [`Finder::find_between`], without a copy.
-    pub fn into_pairs_between(self) -> Vec<CrossPair> {
+    ///
+    /// ```
+    /// use pbig_core::{Aabb, CrossPair, Finder};
+    /// let boxes = [Aabb::new([0.0; 3], [1.0; 3])];
+    /// let mut finder = Finder::default();
+    /// finder.find_between(&boxes, &boxes)?;
+    /// assert_eq!(finder.into_pairs_between(), [CrossPair { a: 0, b: 0 }]);
+    /// # Ok::<(), pbig_core::Error>(())
+    /// ```
+    pub fn into_pairs_between(mut self) -> Vec<CrossPair> {
+        self.pairs_between.shrink_to_fit();
         bytemuck::cast_vec(self.pairs_between)
     }
 

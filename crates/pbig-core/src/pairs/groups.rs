@@ -79,6 +79,12 @@ impl Found {
         }
     }
 
+    /// Asserts that all pairs were counted: each gets a place by its count.
+    fn assert_counted(&self) {
+        let counted: u64 = self.groups.iter().flatten().map(|count| u64::from(*count)).sum();
+        assert_eq!(counted, self.pairs.len() as u64, "each pair is counted");
+    }
+
     /// Takes pairs that were found elsewhere, and leaves other memory for them.
     pub(crate) fn take(&mut self, pairs: &mut Vec<Pair>) {
         std::mem::swap(&mut *self.pairs, pairs);
@@ -122,6 +128,7 @@ impl Groups {
         of: fn(&mut T) -> &mut Found,
     ) {
         self.grouping = grouping;
+        threads.iter_mut().for_each(|thread| of(thread).assert_counted());
         let count = self.place(threads, of);
         if let ([one], 1) = (&mut *threads, grouping.count) {
             return std::mem::swap(&mut self.pairs, &mut of(one).pairs);
@@ -136,7 +143,7 @@ impl Groups {
                 *place += 1;
             }
         });
-        // SAFETY: every place has a pair.
+        // SAFETY: as many pairs were counted as there are, so every place has one.
         unsafe { self.pairs.set_len(count) };
     }
 
@@ -238,7 +245,6 @@ impl Sorter {
         let mut spans = std::mem::take(&mut self.spans);
         spans.resize(ids.len(), Span::default());
         self.make_room(pairs.len());
-        ensure_scratch(&mut self.others, pairs.len() + SHORT, 0);
         dispatch!(sort_pairs, pairs, ids.start as u32, &mut spans, self);
         self.spans = spans;
     }
@@ -337,6 +343,7 @@ fn sort_pairs(
                 }
             }
             _ => {
+                ensure_scratch(others, len + SHORT, 0);
                 row::sort_into(simd, unsorted, 0..len, others, long);
                 write(a, others, &mut pairs[..len]);
             }
@@ -354,6 +361,22 @@ fn write(a: u32, others: &[u32], pairs: &mut [Pair]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_group_is_sorted_where_it_lies_whatever_the_lengths_of_its_rows() {
+        for last in [0u32, 1, 4, 5, 8, 9, 200] {
+            let lens = [0, 3, 0, 0, 8, 1, 96, 97, 9, 5, 0, 4, last];
+            let rows = (100u32..).zip(lens);
+            let sorted: Vec<Pair> =
+                rows.flat_map(|(a, len)| (0..len).map(move |i| Pair { a, b: 1000 + 7 * i })).collect();
+            let mut pairs = sorted.clone();
+            pairs.reverse();
+            pairs.sort_by_key(|pair| pair.b % 11);
+            let mut sorter = Sorter::default();
+            sorter.sort_in_place(100..100 + lens.len(), &mut pairs);
+            assert_eq!(pairs, sorted, "{last}");
+        }
+    }
 
     #[test]
     fn rows_that_repeat_an_id_are_shortened_and_others_stay() {

@@ -239,7 +239,8 @@ impl Hits {
                 (&own[*query as usize], &records[*place as usize])
             },
         );
-        push_overlapping(&mut self.found.pairs, pairs);
+        // SAFETY: zipped slices have as many elements as they say.
+        unsafe { push_overlapping(&mut self.found.pairs, pairs) };
         self.keep(from, rule);
     }
 
@@ -305,7 +306,8 @@ impl Hits {
                 #[inline(always)]
                 |other| (one, other),
             );
-            push_overlapping(&mut self.found.pairs, pairs);
+            // SAFETY: a slice has as many elements as it says.
+            unsafe { push_overlapping(&mut self.found.pairs, pairs) };
             from = self.keep_many(from, rule);
         }
         from
@@ -329,9 +331,12 @@ impl Hits {
     }
 }
 
-/// Appends those of some pairs of boxes that overlap. The pairs are those of slices, which have as many as they say.
+/// Appends those of some pairs of boxes that overlap.
+///
+/// # Safety
+/// There are no more pairs than their iterator says.
 #[inline(always)]
-fn push_overlapping<'a>(
+unsafe fn push_overlapping<'a>(
     pairs: &mut Vec<Pair>,
     candidates: impl ExactSizeIterator<Item = (&'a Record, &'a Record)>,
 ) {

@@ -13,7 +13,7 @@ use super::storage::Upload;
 use super::timer::Timer;
 use crate::layout::{Chunk, Counters, LANES, Params, Totals, wide};
 use pbig_core::internal::Clock;
-use pbig_core::{Aabb, BoxIds, DeviceFound, Pair, PairList, SearchRequest};
+use pbig_core::{Aabb, DeviceFound, Pair, PairList, SearchRequest};
 use pbig_shaders::Buffer;
 
 /// Maximum number of repetitions. Each one has the room that the last one asked for.
@@ -57,7 +57,6 @@ impl Session {
         let boxes = Upload::new(Buffer::Boxes, request.boxes);
         let filters = Upload::new(Buffer::Filters, request.filters.unwrap_or(&[]));
         self.found.report.uploaded = self.storage.upload(&[boxes, filters])?;
-        self.submissions += 1;
         self.found.report.upload = clock.lap();
         Ok(())
     }
@@ -163,7 +162,7 @@ impl Session {
         // The number wraps around beyond 32 bits of workgroups.
         let tests = if too_many_tests > 0 { "over 2^40".to_owned() } else { tests.to_string() };
         Err(Failure::Declined(format!(
-            "the device declined {tests} tests of {boxes} boxes, more than {most}"
+            "{tests} tests of {boxes} boxes are more than {most}"
         )))
     }
 
@@ -218,6 +217,8 @@ impl Session {
             made => made?,
         }
         self.submit(Chunk::default(), &passes::group(self.params.boxes, pairs))?;
+        // A few steps for each pair take no patience of their own.
+        self.submissions = 0;
         for first_pair in (0..pairs).step_by(MOST_RANKED as usize) {
             let left = pairs - first_pair;
             self.submit(Chunk { first_pair, ..Chunk::default() }, &passes::rank(left))?;
@@ -247,7 +248,7 @@ impl Session {
         let mut clock = Clock::start();
         let boxes = self.params.boxes;
         let fault = |i| GpuError::BadPairs(format!("pair {i} of a piece is not a < b < {boxes}"));
-        self.found.pairs.append_checked(pairs, BoxIds::First(boxes)).map_err(fault)?;
+        self.found.pairs.append_checked(pairs, boxes).map_err(fault)?;
         self.found.report.decode += clock.lap();
         Ok(())
     }

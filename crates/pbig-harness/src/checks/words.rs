@@ -1,6 +1,6 @@
 //! Pairs of a device, and saved bytes, that may be anything: an error, or pairs as they may be; never a panic.
 
-use pbig_core::{Aabb, BoxIds, BroadPhase, Pair, PairList, ProxyFilter};
+use pbig_core::{Aabb, BroadPhase, Pair, PairList, ProxyFilter};
 
 /// A byte that chooses, and one for the number of boxes; then pairs, or a snapshot.
 pub fn decode_words(data: &[u8]) {
@@ -12,7 +12,7 @@ pub fn decode_words(data: &[u8]) {
     let given: Vec<Pair> = rest.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect();
     let are_right = given.iter().all(|pair| pair.a < pair.b && pair.b < boxes);
     let mut pairs = PairList::default();
-    assert_eq!(pairs.append_checked(&given, BoxIds::First(boxes)).is_ok(), are_right);
+    assert_eq!(pairs.append_checked(&given, boxes).is_ok(), are_right);
     assert_eq!(*pairs, if are_right { &given[..] } else { &[] });
 }
 
