@@ -18,6 +18,7 @@ use std::time::{Duration, Instant};
 type Hooks = ();
 
 /// Adds the scene. Put your own plugins, systems and bodies here, but no window and no `PhysicsPlugins`. What is random needs a seed.
+/// Avian's feature `collider-from-mesh`, a default one, needs bevy's `AssetPlugin` and `MeshPlugin` here.
 fn add_scene(app: &mut App) {
     app.add_systems(Startup, |mut commands: Commands| {
         commands.spawn((RigidBody::Static, Collider::cuboid(200.0, 2.0, 200.0)));
