@@ -100,7 +100,7 @@ impl BroadPhase {
     }
 
     /// Returns the tree of all stored (fat) boxes as they are now, for scene queries. The first call after a change brings it up to
-    /// date.
+    /// date, while other threads that ask wait. The very first sorts the boxes, on the calling thread: about 150 ns a box.
     ///
     /// ```
     /// use pbig_core::{Aabb, BroadPhase, ProxyFilter};

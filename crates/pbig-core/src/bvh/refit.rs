@@ -22,7 +22,7 @@ const PEAK: usize = 8;
 impl BoxIndex {
     /// Takes the boxes as they are now: `boxes` by id, [`Aabb::NOWHERE`] for an absent one. `changed` are the ids whose boxes
     /// may differ from those at the last call, in any order, repeated or not; without it any box may differ. Ids beyond the list have
-    /// no box. Shares the work of many boxes among rayon's threads.
+    /// no box. The first call sorts the boxes. Shares the work of many boxes among rayon's threads.
     pub fn refresh(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
         let gone = boxes.len() as u32..self.known as u32;
         if changed.is_none() || gone.is_empty() {
