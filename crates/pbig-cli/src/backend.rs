@@ -1,7 +1,7 @@
 //! Options that choose the backend and its adapter, and what a run on a GPU owes its user.
 
 use pbig_core::{BroadPhase, Config, Finder, PairDevice};
-use pbig_gpu::{GpuFinder, GpuOptions};
+use pbig_gpu::{DECLINED, GpuFinder, GpuOptions};
 use pbig_harness::options::{BackendOption, shared_gpu};
 use pbig_harness::output::{Failure, warn};
 use rapier_pbig::PbigBroadPhase;
@@ -90,9 +90,20 @@ impl BackendArgs {
 /// Returns the reason why the work was not all done by a GPU.
 fn no_gpu(adapter: Option<&str>, fallback: Option<&str>) -> Option<String> {
     match (fallback, adapter) {
-        (Some(why), _) => Some(format!("the CPU did work: {why}")),
+        (Some(why), _) => Some(plain(why)),
         (None, None) => Some("there was no work for a GPU".into()),
         (None, Some(name)) => is_software(name).then(|| format!("{name} is a software adapter")),
+    }
+}
+
+/// Returns the reason of a fallback in the words of the command line, which has no options of the library.
+fn plain(why: &str) -> String {
+    let why = why.strip_suffix(": the CPU does the work").unwrap_or(why);
+    let why = why.replace("the device or GpuOptions::max_bytes", "the device");
+    let why = why.replace("GpuOptions::max_total_bytes", "pbig").replace(" (GpuOptions::patience)", "");
+    match why.strip_prefix(DECLINED) {
+        Some(why) => format!("the GPU declined the boxes: {why}"),
+        None => format!("the CPU did work: {why}"),
     }
 }
 
@@ -109,12 +120,28 @@ pub(crate) fn adapter_line(adapter: Option<&str>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pbig_gpu::GpuError;
+    use std::time::Duration;
 
     #[test]
     fn only_hardware_that_did_all_the_work_is_a_gpu() {
         let hardware = Some("NVIDIA H100 (software edition) (discrete, vulkan)");
         assert_eq!(no_gpu(hardware, None), None);
         assert_eq!(no_gpu(hardware, Some("it was lost")).as_deref(), Some("the CPU did work: it was lost"));
+        let declined = |what: &GpuError| {
+            no_gpu(hardware, Some(&format!("{DECLINED}{what}: the CPU does the work"))).expect("a reason")
+        };
+        assert_eq!(
+            declined(&GpuError::TooLarge { what: "out", bytes: 9, limit: 8 }),
+            "the GPU declined the boxes: the buffer out needs 9 bytes, but the device allows 8"
+        );
+        assert_eq!(
+            declined(&GpuError::OverBudget { what: "out", bytes: 9, limit: 8 }),
+            "the GPU declined the boxes: with the buffer out the device's buffers need 9 bytes, but pbig allows 8"
+        );
+        let late = format!("{}: the CPU does the work", GpuError::Timeout(Duration::from_secs(30)));
+        let late = no_gpu(hardware, Some(&late));
+        assert_eq!(late.as_deref(), Some("the CPU did work: the device did not answer within 30s"));
         assert_eq!(no_gpu(None, None).as_deref(), Some("there was no work for a GPU"));
         let software = no_gpu(Some("llvmpipe (LLVM 15) (software, vulkan)"), None);
         assert_eq!(software.as_deref(), Some("llvmpipe (LLVM 15) (software, vulkan) is a software adapter"));

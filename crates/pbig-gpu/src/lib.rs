@@ -43,7 +43,7 @@ mod policy;
 #[cfg(feature = "wgpu")]
 pub use gpu::testing;
 #[cfg(feature = "wgpu")]
-pub use gpu::{DeviceBoxes, DevicePairs, GpuError, GpuFinder, adapter, adapters, describe};
+pub use gpu::{DECLINED, DeviceBoxes, DevicePairs, GpuError, GpuFinder, adapter, adapters, describe};
 #[cfg(feature = "wgpu")]
 pub use layout::PairCount;
 pub use options::GpuOptions;

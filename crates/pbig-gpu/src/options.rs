@@ -21,8 +21,9 @@ pub struct GpuOptions {
     /// Bytes for each box, in the first call, of the lists whose lengths only the device knows. With less than they need the
     /// call begins anew.
     pub first_bytes: u64,
-    /// Longest time that a call waits for one submission before it finishes on the CPU. A device that hangs costs this time once,
-    /// and after it `pause`: a game sets less, a batch on a device that others use sets more.
+    /// Longest time that a call waits for a submission of checks or of sorting before it finishes on the CPU. A device that hangs
+    /// costs this time for each one that the call waits for, mostly one, and after it `pause`: a game sets less, a batch on a device
+    /// that others use sets more.
     pub patience: Duration,
     /// Time for which calls stay on the CPU after the device failed.
     pub pause: Duration,
@@ -32,8 +33,8 @@ pub struct GpuOptions {
     /// Maximum number of boxes of a cell, up to 256, whose pairs are tested through Avril's mapping. Larger cells are
     /// tested by PBIG's balanced rows.
     pub small_cell: u32,
-    /// Maximum number of boxes of a set whose pairs are all tested, without a grid. 0: there is always a grid. Avril's
-    /// table 7 puts the crossover at 1000.
+    /// Maximum number of boxes of a set whose pairs are all tested, without a grid. 0: there is always a grid. Values above 32,768
+    /// count as 32,768. Avril's table 7 puts the crossover at 1000.
     pub all_pairs_up_to: u32,
     /// If true, the device counts the tests that it makes, those that repeat another and those of boxes that are apart. It
     /// costs four more atomic operations for each workgroup.

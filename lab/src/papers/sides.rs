@@ -4,7 +4,7 @@ use super::printed::MOST_BOXES;
 use crate::UNSORTED;
 use crate::pbig_grid::{CellRule, pbig_grid};
 use pbig_core::{Aabb, Backend, Config, Finder, Report};
-use pbig_gpu::{GpuFinder, GpuOptions};
+use pbig_gpu::{DECLINED, GpuFinder, GpuOptions};
 use pbig_harness::prelude::*;
 use std::time::Duration;
 
@@ -56,7 +56,7 @@ impl Racer {
         Self { way, finder, calls: vec![] }
     }
 
-    /// Makes a call. Fails if a device left it to the CPU.
+    /// Makes a call. It has no time if a device declined the boxes. Fails if a device failed.
     fn call(&mut self, boxes: &[Aabb]) -> Result<SearchCall, Failure> {
         let cells = match self.way {
             Way::Pbig(options) => Some((options, CellRule::Objective)),
@@ -72,7 +72,11 @@ impl Racer {
         let (found, ms) = timed(|| self.finder.find(boxes).map(|_| ()));
         found?;
         let report = self.finder.report().clone();
-        check(report.fallback.is_none(), || report.fallback.clone().unwrap_or_default())?;
+        let why = report.fallback.as_deref().unwrap_or_default();
+        let is_declined = why.starts_with(DECLINED);
+        check(why.is_empty() || is_declined, || why.to_owned())?;
+        // An empty cell of a table.
+        let ms = if is_declined { f64::NAN } else { ms };
         let cell = report.device.as_ref().map(|device| device.cell).filter(|cell| *cell > 0.0);
         Ok(SearchCall { ms, cell, report, ..SearchCall::default() })
     }

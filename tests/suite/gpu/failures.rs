@@ -88,6 +88,19 @@ fn a_device_that_is_lost_at_any_moment_of_a_call_loses_no_pair() {
     assert!((4..8).contains(&lost), "the device was lost in {lost} of 8 calls");
 }
 
+/// An upload and a copy take no patience of their own.
+#[test]
+fn a_hung_device_costs_the_patience_once() {
+    needs_gpu!();
+    let options = GpuOptions { patience: Duration::from_nanos(1), ..GpuOptions::DEFAULT };
+    let mut gpu = GpuFinder::new().expect("an adapter").with_options(options);
+    let boxes = set("pile", 20_000);
+    let request = SearchRequest { boxes: &boxes, filters: None, is_sorted: true, max_pairs: u64::MAX };
+    let why = "the device did not answer within 1ns (GpuOptions::patience)";
+    let result = gpu.find_all(&request, &mut DeviceFound::default());
+    assert_eq!(result, Err(DeviceFailure::Failed(why.into())));
+}
+
 /// An app's device whose first call has no time.
 #[derive(Clone, Debug)]
 struct Busy(GpuFinder, bool);

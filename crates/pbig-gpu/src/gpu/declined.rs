@@ -17,7 +17,7 @@ impl Declined {
     pub(super) fn unseen(&mut self, boxes: usize) -> Option<String> {
         let is_alike = boxes / 2 <= self.boxes && self.boxes / 2 <= boxes;
         self.calls_left = self.calls_left.checked_sub(1)?;
-        is_alike.then(|| format!("not tried again yet: {}", self.why))
+        is_alike.then(|| format!("a set of about this size was declined before: {}", self.why))
     }
 
     pub(super) fn note(&mut self, boxes: usize, why: &str) {

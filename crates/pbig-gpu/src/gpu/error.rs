@@ -3,6 +3,10 @@
 
 use pbig_core::DeviceFailure;
 
+/// The first words of [`pbig_core::Report::fallback`] after a call that a working device left to the CPU: the set was too large, or
+/// would have taken too many tests.
+pub const DECLINED: &str = "the device declined: ";
+
 /// Reason why a device could not do the work.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -38,7 +42,7 @@ pub enum GpuError {
     #[error("refused by wgpu: {0}")]
     Refused(String),
     /// A buffer would be larger than a limit allows.
-    #[error("{what}: {bytes} bytes are needed, but the device or GpuOptions::max_bytes allows {limit}")]
+    #[error("the buffer {what} needs {bytes} bytes, but the device or GpuOptions::max_bytes allows {limit}")]
     TooLarge {
         /// The buffer's name.
         what: &'static str,
@@ -47,9 +51,20 @@ pub enum GpuError {
         /// The limit, in bytes.
         limit: u64,
     },
+    /// The boxes may have more entries of cells than 32 bits count.
+    #[error(
+        "{boxes} boxes may have {entries} entries in cells, but the device counts up to {max}",
+        max = u32::MAX
+    )]
+    TooManyEntries {
+        /// The number of boxes.
+        boxes: u32,
+        /// The largest number of their entries.
+        entries: u64,
+    },
     /// All buffers together would be larger than [`crate::GpuOptions::max_total_bytes`].
     #[error(
-        "{what}: with it the device's buffers are {bytes} bytes, but GpuOptions::max_total_bytes allows {limit}"
+        "with the buffer {what} the device's buffers need {bytes} bytes, but GpuOptions::max_total_bytes allows {limit}"
     )]
     OverBudget {
         /// The name of the buffer that was to be made.
@@ -81,13 +96,18 @@ pub(super) enum Failure {
     Device(GpuError),
 }
 
+impl GpuError {
+    /// Returns true if the set is too large for the device or for the options.
+    pub(super) fn is_of_large_set(&self) -> bool {
+        matches!(self, Self::TooLarge { .. } | Self::TooManyEntries { .. } | Self::OverBudget { .. })
+    }
+}
+
 impl<E: Into<GpuError>> From<E> for Failure {
     fn from(error: E) -> Self {
         match error.into() {
             // The device works: it is the set that is too large.
-            large @ (GpuError::TooLarge { .. } | GpuError::OverBudget { .. }) => {
-                Self::Declined(large.to_string())
-            }
+            error if error.is_of_large_set() => Self::Declined(error.to_string()),
             error => Self::Device(error),
         }
     }
@@ -98,7 +118,7 @@ impl Failure {
     pub(super) fn for_core(self) -> DeviceFailure {
         match self {
             Self::TooManyPairs => DeviceFailure::TooManyPairs,
-            Self::Declined(why) => DeviceFailure::Declined(why),
+            Self::Declined(why) => DeviceFailure::Declined(format!("{DECLINED}{why}")),
             Self::Device(error) => DeviceFailure::Failed(error.to_string()),
         }
     }

@@ -13,6 +13,9 @@ use pbig_shaders::Buffer;
 /// Number of boxes by which lists of the first call are longer than for the boxes there are: few boxes may need many entries.
 const EXTRA_BOXES: u64 = 4096;
 
+/// Maximum number of boxes whose pairs are all tested: the kernel counts in 32 bits, see `pair_index.wgsl`.
+const MOST_ALL_PAIRS: u32 = 32_768;
+
 /// The plan and the lengths that earlier calls have told.
 #[derive(Debug)]
 pub(super) struct Forecast {
@@ -60,7 +63,7 @@ impl Forecast {
 
 /// Returns true if not every pair is tested.
 pub(super) fn needs_grid(options: &GpuOptions, boxes: u32) -> bool {
-    boxes > options.all_pairs_up_to.max(1)
+    boxes > options.all_pairs_up_to.clamp(1, MOST_ALL_PAIRS)
 }
 
 /// Returns the parameters of a call, without grid and capacities.
@@ -72,5 +75,17 @@ fn ungridded(storage: &Storage, options: &GpuOptions, boxes: u32, has_filters: b
         columns: if storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
         flags: FILTERED * u32::from(has_filters) + COUNTED * u32::from(options.count_tests),
         ..Params::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_boxes_have_a_grid_whatever_the_option() {
+        let with = |all_pairs_up_to| GpuOptions { all_pairs_up_to, ..GpuOptions::DEFAULT };
+        let first_grid = |options: GpuOptions| (0..70_000).find(|boxes| needs_grid(&options, *boxes));
+        assert_eq!([0, 1, 1000, u32::MAX].map(|most| first_grid(with(most))), [2, 2, 1001, 32_769].map(Some));
     }
 }

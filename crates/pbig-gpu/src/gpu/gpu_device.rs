@@ -1,4 +1,4 @@
-//! The device: pipelines, buffers, submissions. Only this file and `readback` talk to a queue.
+//! The device: its pipelines, buffers and submissions.
 
 use super::{GpuError, adapter};
 use crate::GpuOptions;

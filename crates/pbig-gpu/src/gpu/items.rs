@@ -15,7 +15,8 @@ pub(super) fn cut(all: Chunk, [small, large]: [u32; 2]) -> Vec<Chunk> {
     let (small, large) = (small.max(1), large.max(1));
     let count = all.small_items.div_ceil(small).max(all.large_items.div_ceil(large));
     let part = |i: u32| {
-        let (s, l) = ((i * small).min(all.small_items), (i * large).min(all.large_items));
+        let from = |size: u32, items: u32| i.saturating_mul(size).min(items);
+        let (s, l) = (from(small, all.small_items), from(large, all.large_items));
         Chunk {
             first_small: all.first_small + s,
             small_items: small.min(all.small_items - s),
@@ -33,7 +34,17 @@ mod tests {
 
     #[test]
     fn chunks_cover_every_item_once() {
-        for (small, large) in [(0, 0), (1, 0), (0, 7), (10, 3), (9, 9)] {
+        // In the last one the 1024th chunk would begin at large item 2^32.
+        let long = 1024 * 1026;
+        for ([small, large], chunk) in [
+            ([0, 0], [3, 2]),
+            ([1, 0], [3, 2]),
+            ([0, 7], [3, 2]),
+            ([10, 3], [3, 2]),
+            ([9, 9], [3, 2]),
+            ([long, 5], [1024, 1 << 22]),
+            ([5, long], [1 << 22, 1024]),
+        ] {
             let all = Chunk {
                 first_small: 5,
                 small_items: small,
@@ -41,7 +52,7 @@ mod tests {
                 large_items: large,
                 ..Chunk::default()
             };
-            let chunks = cut(all, [3, 2]);
+            let chunks = cut(all, chunk);
             let items = |of: fn(&Chunk) -> (u32, u32)| -> Vec<u32> {
                 chunks.iter().map(of).flat_map(|(first, n)| first..first + n).collect()
             };

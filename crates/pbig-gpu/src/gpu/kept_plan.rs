@@ -3,7 +3,7 @@
 
 use super::{GpuError, GpuPlan};
 use crate::GpuOptions;
-use crate::layout::{Counters, LANES};
+use crate::layout::{Counters, LANES, MAX_LEVELS, MAX_SPAN};
 use crate::pbig::Summary;
 use crate::policy::most_tests;
 use pbig_core::Aabb;
@@ -16,6 +16,11 @@ pub(super) const FINER_RETRY: f32 = 0.125;
 
 /// Maximum number of cells of a plan.
 const MAX_CELLS: u64 = 1 << 28;
+
+/// Maximum number of cells that a box touches in its own level, in the next one, and so on. A coarser cell is at least two finer
+/// ones long, so a box touches 4, then 3, then 2 cells on an axis.
+const CELLS_OF_A_BOX: [u64; MAX_LEVELS - 1] = [64, 27, 8, 8, 8, 8, 8];
+const _: () = assert!(MAX_SPAN == 4);
 
 /// A plan, and how it did.
 #[derive(Debug)]
@@ -70,15 +75,12 @@ impl KeptPlan {
         most.min(u64::from(u32::MAX) - 1) as u32
     }
 
-    /// Returns an error if 32 bits might not count the entries of this number of boxes: up to 4 x 4 x 4 in each level but the last.
+    /// Returns an error if 32 bits might not count the entries of this number of boxes, whatever their sizes.
     pub(super) fn check_entries(&self, boxes: u32) -> Result<(), GpuError> {
-        let entries = u64::from(boxes) * (64 * (self.plan.levels.len() as u64 - 1) + 1);
-        let limit = u64::from(u32::MAX);
-        if entries > limit {
-            Err(GpuError::TooLarge { what: "entries", bytes: entries, limit })
-        } else {
-            Ok(())
-        }
+        // The last level has one cell.
+        let of_a_box = 1 + CELLS_OF_A_BOX[..self.plan.levels.len() - 1].iter().sum::<u64>();
+        let entries = u64::from(boxes) * of_a_box;
+        if entries > u32::MAX.into() { Err(GpuError::TooManyEntries { boxes, entries }) } else { Ok(()) }
     }
 
     /// Notes a call. Returns true if the work for a box has doubled or halved since the first one.
@@ -93,6 +95,7 @@ impl KeptPlan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::Level;
 
     fn kept(boxes: usize) -> KeptPlan {
         let cubes: Vec<_> = (0..boxes).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.5; 3])).collect();
@@ -118,6 +121,39 @@ mod tests {
         assert!(!plan.is_outgrown_after(&counted(1000, 8000, 70)));
         assert!(plan.is_outgrown_after(&counted(1000, 8000, 120)));
         assert!(plan.is_outgrown_after(&counted(1000, 4000, 15)));
+    }
+
+    /// Returns a plan of this number of levels. No search uses it.
+    fn with_levels(levels: usize) -> KeptPlan {
+        let mut plan = kept(1000);
+        plan.plan.levels = vec![Level::default(); levels];
+        plan
+    }
+
+    #[test]
+    fn thirty_million_boxes_have_no_more_entries_than_32_bits_count() {
+        for levels in 1..=MAX_LEVELS {
+            for boxes in [10_000_000, 30_000_000] {
+                assert_eq!(with_levels(levels).check_entries(boxes), Ok(()), "{levels} levels");
+            }
+        }
+        // 132 x 32,537,631 = 2^32 - 4.
+        let plan = with_levels(MAX_LEVELS);
+        assert_eq!(plan.check_entries(32_537_631), Ok(()));
+        let why = plan.check_entries(32_537_632).expect_err("2^32 + 128 entries").to_string();
+        assert_eq!(
+            why,
+            "32537632 boxes may have 4294967424 entries in cells, but the device counts up to 4294967295"
+        );
+    }
+
+    /// The table against the kernels' shifts: boxes of up to four cells on an axis, wherever they begin.
+    #[test]
+    fn a_box_touches_no_more_cells_of_a_level_than_the_table_says() {
+        for (coarser, most) in CELLS_OF_A_BOX.into_iter().enumerate() {
+            let touched = |low: u64| ((low + u64::from(MAX_SPAN) - 1) >> coarser) - (low >> coarser) + 1;
+            assert_eq!((0..1024).map(touched).max().map(|axis| axis.pow(3)), Some(most), "{coarser}");
+        }
     }
 
     /// The largest number would tell the device that there is no limit, even if its counts wrapped around.

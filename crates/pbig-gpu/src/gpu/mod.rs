@@ -27,7 +27,7 @@ mod watch;
 
 pub use adapter::describe;
 use error::Failure;
-pub use error::GpuError;
+pub use error::{DECLINED, GpuError};
 use gpu_plan::GpuPlan;
 pub use resident::{DeviceBoxes, DevicePairs};
 
@@ -243,7 +243,8 @@ impl GpuFinder {
         let kept = self.resident.take().filter(|kept| kept.suits(device, &self.options));
         let mut resident = kept.unwrap_or_else(|| Resident::new(device, &self.options));
         let result = device.watch_now(|| resident.record(encoder, boxes));
-        if matches!(result, Ok(_) | Err(GpuError::Argument(_) | GpuError::TooLarge { .. })) {
+        use GpuError::{Argument, TooLarge, TooManyEntries};
+        if matches!(result, Ok(_) | Err(Argument(_) | TooLarge { .. } | TooManyEntries { .. })) {
             self.resident = Some(resident);
         }
         result

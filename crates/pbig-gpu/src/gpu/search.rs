@@ -161,9 +161,7 @@ impl Session {
         let [tests, most] = [tests, most_tests].map(|tests| u64::from(LANES) * u64::from(tests));
         // The number wraps around beyond 32 bits of workgroups.
         let tests = if too_many_tests > 0 { "over 2^40".to_owned() } else { tests.to_string() };
-        Err(Failure::Declined(format!(
-            "{tests} tests of {boxes} boxes are more than {most}"
-        )))
+        Err(Failure::Declined(format!("{tests} tests of {boxes} boxes are more than {most}")))
     }
 
     /// Notes the grid, the tests and the memory of the call.

@@ -34,7 +34,7 @@ pub(super) struct Session {
     pub(super) found: DeviceFound,
     /// Words of pairs that came with the counts.
     pub(super) prefetched: Vec<u32>,
-    /// Number of submissions since the last wait.
+    /// Number of submissions since the last wait whose work grows with the tests or the pairs: each has the patience of the options.
     pub(super) submissions: u32,
 }
 
@@ -126,7 +126,6 @@ impl Session {
         let mut encoder = self.device.encoder();
         copy(&self.storage, &mut encoder, self.storage.get(staging));
         self.found.report.downloaded += bytes;
-        self.submissions += 1;
         Ok(Fetch { staging, bytes, submission: self.device.submit(encoder) })
     }
 
