@@ -127,6 +127,7 @@ fn drop_pairs_of_removed(world: &World, kept: &mut Kept) {
     let has_ended = |pair: &Pair| world.was_removed(pair.a) || world.was_removed(pair.b);
     let all = world.present.iter().chain(absent).flat_map(pairs);
     let mut dropped: Vec<Pair> = all.filter(has_ended).collect();
-    dropped.sort_unstable();
-    kept.apply(&[], &dropped);
+    // Two sorted lists one behind the other: a stable sort merges them.
+    dropped.sort();
+    kept.drop_pairs(&dropped);
 }

@@ -94,6 +94,9 @@ pub(super) fn sort(entries: &mut [Entry], Order { split, leaf }: Order) -> Vec<R
     let samples = sampled(entries, &classes);
     let workers = if entries.len() < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
     run_parts(workers, split_into(entries, classes.iter().map(Range::len)), |_, class| {
+        if class.len() <= leaf {
+            return;
+        }
         let may_meet = |sample: &Sampled| sample.entry.may_meet(&class[0], split);
         let samples = samples.iter().copied().filter(may_meet).collect();
         sort_by_place(class, leaf, &Others { samples, is_few: false });

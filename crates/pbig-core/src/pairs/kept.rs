@@ -207,6 +207,22 @@ impl Kept {
         Rows { spans, pool }
     }
 
+    /// Takes pairs out before a search, sorted. Many are not taken out of the rows of `b`, which are made anew later.
+    pub(crate) fn drop_pairs(&mut self, pairs: &[Pair]) {
+        self.forget_backward_if(self.are_many(pairs.len()));
+        self.apply(&[], pairs);
+    }
+
+    fn are_many(&self, events: usize) -> bool {
+        events * IDS_OF_EVENT > self.lower.len()
+    }
+
+    fn forget_backward_if(&mut self, is_useless: bool) {
+        if is_useless {
+            self.backward.take();
+        }
+    }
+
     /// Inserts added pairs into the rows, and takes removed pairs out. Both lists are sorted.
     pub(crate) fn apply(&mut self, added: &[Pair], removed: &[Pair]) {
         self.change(removed, Rows::remove);
@@ -248,9 +264,7 @@ impl Kept {
         }
         self.count(added, removed);
         let events = added.len() + removed.len();
-        if names.is_none() || events * IDS_OF_EVENT > self.lower.len() {
-            self.backward.take();
-        }
+        self.forget_backward_if(names.is_none() || self.are_many(events));
         self.change_backward(removed, Rows::remove);
         self.change_backward(added, Rows::insert);
     }
