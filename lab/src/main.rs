@@ -48,6 +48,9 @@ enum Command {
         /// Boxes in a world.
         #[arg(long, default_value_t = 10_000)]
         boxes: usize,
+        /// Kind of worlds to search among.
+        #[arg(long, value_enum, default_value = "one-set")]
+        kind: worst::Kind,
     },
     /// Run time against error, from the index of a pair to the pair.
     Accuracy,
@@ -63,8 +66,8 @@ fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Peers => peers::run(cli.quick)?,
         Command::Steady { boxes } => steady::run(cli.quick, boxes)?,
         Command::Hard => hard::run(cli.quick)?,
-        Command::Worst { seconds, seed, boxes } => {
-            worst::run(worst::Search { seconds: *seconds, seed: *seed, boxes: *boxes })?
+        &Command::Worst { seconds, seed, boxes, kind } => {
+            worst::run(worst::Search { seconds, seed, boxes, kind })?
         }
         Command::Accuracy => accuracy::run(cli.quick)?,
     };

@@ -2,7 +2,8 @@
 //! the work are kept.
 
 use pbig_harness::hard::{
-    Change, History, Part, Placement, Recipe, histories, ratio_of_history, ratio_of_search, shapes,
+    Change, History, Part, Placement, Recipe, histories, ratio_of_history, ratio_of_search, ratio_of_two,
+    shapes,
 };
 use pbig_harness::prelude::*;
 use rand::rngs::StdRng;
@@ -21,12 +22,42 @@ pub struct Search {
     pub seed: u64,
     /// Boxes in a world.
     pub boxes: usize,
+    /// Worlds to search among.
+    pub kind: Kind,
 }
 
-/// A world or a history, and its ratio.
+/// Kinds of worlds to search among.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Kind {
+    /// Worlds of one set of boxes.
+    OneSet,
+    /// Worlds of two sets, whose pairs have a box of each.
+    TwoSets,
+    /// Worlds that change.
+    Histories,
+}
+
+impl Kind {
+    /// Returns the worlds of this kind from which a search begins.
+    fn known(self) -> Vec<Find> {
+        let all: Vec<Recipe> = shapes().into_iter().map(|(_, recipe)| recipe).collect();
+        let next = all.iter().cycle().skip(1);
+        match self {
+            Self::OneSet => all.into_iter().map(Find::World).collect(),
+            Self::TwoSets => {
+                all.iter().zip(next).map(|(a, b)| Find::Two([a.clone(), b.clone()], 1)).collect()
+            }
+            Self::Histories => histories().into_iter().map(|(_, history)| Find::History(history)).collect(),
+        }
+    }
+}
+
+/// A world or a history that may be the worst.
 #[derive(Clone, Debug)]
 enum Find {
     World(Recipe),
+    /// Two sets; the first one has a share of the boxes, as one in this number plus one.
+    Two([Recipe; 2], usize),
     History(History),
 }
 
@@ -34,6 +65,7 @@ impl Find {
     fn ratio(&self, n: usize) -> Option<f64> {
         match self {
             Self::World(recipe) => ratio_of_search(recipe, n),
+            Self::Two(sets, part) => ratio_of_two(sets, [n / (part + 1), n - n / (part + 1)]),
             Self::History(history) => ratio_of_history(history, n),
         }
     }
@@ -41,6 +73,12 @@ impl Find {
     fn mutated(&self, random: &mut StdRng) -> Self {
         match self {
             Self::World(recipe) => Self::World(mutated(recipe, random)),
+            Self::Two([a, b], part) => match random.random_range(0..8) {
+                0 => Self::Two([b.clone(), a.clone()], *part),
+                1 => Self::Two([a.clone(), b.clone()], [1, 2, 10, 100][random.random_range(0..4)]),
+                2..5 => Self::Two([mutated(a, random), b.clone()], *part),
+                _ => Self::Two([a.clone(), mutated(b, random)], *part),
+            },
             Self::History(history) => Self::History(mutated_history(history, random)),
         }
     }
@@ -49,9 +87,7 @@ impl Find {
 /// Runs a search, and tells the worst finds.
 pub fn run(search: Search) -> Result<BenchReport, Failure> {
     let mut random = StdRng::seed_from_u64(search.seed);
-    let worlds = shapes().into_iter().map(|(_, recipe)| Find::World(recipe));
-    let known: Vec<Find> =
-        worlds.chain(histories().into_iter().map(|(_, history)| Find::History(history))).collect();
+    let known = search.kind.known();
     let mut best: Vec<(f64, Find)> =
         known.iter().filter_map(|find| Some((find.ratio(search.boxes)?, find.clone()))).collect();
     let (clock, end) = (Instant::now(), Duration::from_secs(search.seconds));
@@ -158,12 +194,14 @@ mod tests {
 
     #[test]
     fn a_search_finds_worse_worlds_than_it_begins_with() {
-        let of = |seconds: u64| {
-            let report = run(Search { seconds, seed: 1, boxes: 1000 }).expect("a search");
-            report.tables[0].numbers("ratio")
-        };
-        let (start, end) = (of(0), of(2));
-        assert_eq!(start.len(), end.len());
-        assert!(start.iter().sum::<f64>() < end.iter().sum(), "{start:?} {end:?}");
+        for kind in [Kind::OneSet, Kind::TwoSets, Kind::Histories] {
+            let of = |seconds: u64| {
+                let report = run(Search { seconds, seed: 1, boxes: 1000, kind }).expect("a search");
+                report.tables[0].numbers("ratio")
+            };
+            let (start, end) = (of(0), of(1));
+            assert_eq!(start.len(), end.len());
+            assert!(start.iter().sum::<f64>() < end.iter().sum(), "{kind:?}: {start:?} {end:?}");
+        }
     }
 }

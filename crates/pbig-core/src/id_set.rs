@@ -18,6 +18,10 @@ impl IdSet {
         self.len
     }
 
+    pub(crate) fn contains(&self, id: u32) -> bool {
+        self.bits[id as usize / 64] & 1 << (id % 64) != 0
+    }
+
     /// Makes room for ids below `ids`; no member is beyond.
     pub(crate) fn reserve(&mut self, ids: usize) {
         self.bits.resize(ids.div_ceil(64), 0);
@@ -101,6 +105,7 @@ mod tests {
         assert!(set.iter().eq(all) && set.len() == 8);
         [64, 4096, 9999].iter().for_each(|id| set.remove(*id));
         assert!(set.iter().eq([0, 63, 65, 4095, 8191]) && set.len() == 5);
+        assert!([64, 4097].iter().all(|id| !set.contains(*id)) && set.iter().all(|id| set.contains(id)));
         set.reserve(8192);
         assert!(set.iter().eq([0, 63, 65, 4095, 8191]));
     }

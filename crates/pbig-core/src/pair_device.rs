@@ -20,8 +20,8 @@ use std::fmt;
 /// * Ids are indices into [`SearchRequest::boxes`], and each filter belongs to the box of the same index.
 /// * Calls do not depend on each other: each has all boxes. A [`crate::BroadPhase`] compares the pairs of an update with those of
 ///   the last one itself.
-/// * The core checks the form of an answer: ids out of range make it a failure. It does not check that pairs overlap or that
-///   none is missing.
+/// * The core checks the form of an answer: ids out of range make it a failure. An update drops pairs that are there twice or name an
+///   id without a box. The core does not check that pairs overlap or that none is missing.
 pub trait PairDevice: fmt::Debug + Send + Sync {
     /// Finds all pairs. `found` is empty, and has the memory of earlier calls.
     ///

@@ -192,6 +192,14 @@ pub fn ratio_of_search(recipe: &Recipe, n: usize) -> Option<f64> {
     Some(ratio(finder.report()))
 }
 
+/// Returns the ratio of a search for the pairs of two sets of some boxes; none where there are too many pairs.
+pub fn ratio_of_two(recipes: &[Recipe; 2], n: [usize; 2]) -> Option<f64> {
+    let [a, b] = [0, 1].map(|set| recipes[set].boxes(n[set], 1 + set as u64));
+    let mut finder = Finder::new(config());
+    finder.find_between(&a, &b).ok()?;
+    Some(ratio(finder.report()))
+}
+
 /// Returns the largest ratio of all updates of a history; none where there are too many pairs.
 pub fn ratio_of_history(history: &History, n: usize) -> Option<f64> {
     let mut broad_phase = BroadPhase::new(config()).ok()?;

@@ -34,7 +34,6 @@ impl Search {
         }
         let all = Boxes { boxes, filters: world.is_filtered.then_some(&filters[..]), keys: None };
         let is_on_device = device.is_some();
-        self.groups.may_repeat = is_on_device;
         task.report.work += (boxes.len() - world.present.len()) as u64;
         let grouping = Some(Grouping::new(boxes.len()));
         if let Some(device) = device {
@@ -92,7 +91,8 @@ impl Search {
         if let Some(names) = names {
             self.groups.rename_partners(names);
         }
-        task.events.run((&mut self.groups, names), task.kept, AllPairs::workers(boxes));
+        let doubted = is_on_device.then_some(&world.present);
+        task.events.run((&mut self.groups, names), task.kept, AllPairs::workers(boxes), doubted);
     }
 }
 

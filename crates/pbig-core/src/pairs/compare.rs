@@ -4,6 +4,7 @@ use super::groups::{self, Groups, Span};
 use super::kept::{Kept, Rows};
 use super::row::{self, equal};
 use crate::Pair;
+use crate::id_set::IdSet;
 use crate::memory::ShrinkingVec;
 use crate::parallel::{run_parts_with, split_into};
 use crate::simd::{Simd, dispatch};
@@ -27,12 +28,13 @@ struct Part {
 
 impl Comparison {
     /// Compares all found pairs with the kept pairs, and keeps the found ones. With `names`, a search of these ids alone has found
-    /// the pairs, and their `a` are places in this list.
+    /// the pairs, and their `a` are places in this list. Pairs that are doubted count only if these ids know both.
     pub(crate) fn run(
         &mut self,
         (found, names): (&mut Groups, Option<&[u32]>),
         kept: &mut Kept,
         workers: usize,
+        doubted: Option<&IdSet>,
     ) {
         let (grouping, count) = (found.grouping, found.len());
         let mut next = std::mem::take(&mut kept.next);
@@ -52,8 +54,10 @@ impl Comparison {
             part.added.clear();
             part.removed.clear();
             pairs.sort(group, sorter, spans, pool, first_place);
-            if pairs.may_repeat {
-                groups::drop_repeated(spans, pool, first_place);
+            if let Some(known) = doubted {
+                let name = |place: u32| names.map_or(place, |names| names[place as usize]);
+                let rows = spans.iter_mut().zip((first_id..).map(name));
+                groups::drop_false(rows, pool, first_place, known);
             }
             let new = NewRows { names, first_id, first_place, spans, pool };
             dispatch!(Part::compare, part, old, &new);

@@ -109,8 +109,6 @@ impl Found {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Groups {
     pub(super) grouping: Grouping,
-    /// True if pairs may be there twice: those of a device that breaks its promise.
-    pub(crate) may_repeat: bool,
     /// Pairs, group by group.
     pairs: ShrinkingVec<Pair>,
     /// By group: its first pair; then the number of pairs.
@@ -260,24 +258,31 @@ impl Sorter {
     }
 }
 
-/// Shortens the rows of a group that have an id twice. The group's first row begins at `base`. A sorted row that repeats an id has every
-/// id of the row and no other, but perhaps not in order.
-pub(super) fn drop_repeated(spans: &mut [Span], others: &mut [u32], base: u32) {
-    for span in spans {
+/// Shortens the rows of a group to what a device that breaks its promise may have said: each id once, and known ones only. The first row
+/// begins at `base`; each span comes with the id of its row. A sorted row that repeats an id has every id of the row and no other,
+/// but perhaps not in order.
+pub(super) fn drop_false<'a>(
+    rows: impl Iterator<Item = (&'a mut Span, u32)>,
+    others: &mut [u32],
+    base: u32,
+    known: &IdSet,
+) {
+    for (span, a) in rows {
         let start = (span.start - base) as usize;
         let row = &mut others[start..start + span.len as usize];
-        if !row.is_sorted_by(|one, next| one < next) {
+        let is_known = |b: u32| known.contains(a) && known.contains(b);
+        if !row.is_sorted_by(|one, next| one < next) || !row.iter().all(|b| is_known(*b)) {
             row.sort_unstable();
-            span.len = dedup(row) as u32;
+            span.len = keep_known(row, is_known) as u32;
         }
     }
 }
 
-/// Moves each id of a sorted row to its start, once. Returns the number of different ids.
-fn dedup(row: &mut [u32]) -> usize {
+/// Moves each known id of a sorted row to its start, once. Returns their number.
+fn keep_known(row: &mut [u32], is_known: impl Fn(u32) -> bool) -> usize {
     let mut len = 0;
     for i in 0..row.len() {
-        if len == 0 || row[len - 1] < row[i] {
+        if is_known(row[i]) && (len == 0 || row[len - 1] < row[i]) {
             row[len] = row[i];
             len += 1;
         }
@@ -379,16 +384,20 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_repeat_an_id_are_shortened_and_others_stay() {
-        let mut others = [3, 5, 9, 5, 9, 7, 7, 1, 2];
-        let lens = [1, 4, 0, 2, 2];
+    fn rows_that_repeat_an_id_or_name_an_unknown_one_are_shortened_and_others_stay() {
+        let mut known = IdSet::default();
+        known.reserve(64);
+        (1..30).filter(|id| *id != 8).for_each(|id| known.insert(id));
+        let mut others = [3, 5, 9, 5, 9, 7, 7, 1, 2, 4, 4, 8, 63, 5];
+        let lens = [1, 4, 0, 2, 2, 2, 3];
         let mut start = 100;
         let mut spans = lens.map(|len| {
             start += len;
             Span { start: start - len, len }
         });
-        drop_repeated(&mut spans, &mut others, 100);
+        let ids = [1, 2, 30, 20, 4, 8, 10];
+        drop_false(spans.iter_mut().zip(ids), &mut others, 100, &known);
         let rows = spans.map(|span| others[span.start as usize - 100..][..span.len as usize].to_vec());
-        assert_eq!(rows, [vec![3], vec![5, 9], vec![], vec![7], vec![1, 2]]);
+        assert_eq!(rows, [vec![3], vec![5, 9], vec![], vec![7], vec![1, 2], vec![], vec![5]]);
     }
 }

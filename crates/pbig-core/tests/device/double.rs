@@ -1,6 +1,6 @@
 //! A device that tests every pair, and that fails or lies if it is told to.
 
-use pbig_core::{DeviceFailure, DeviceFound, Pair, PairDevice, ProxyFilter, SearchRequest, oracle};
+use pbig_core::{Aabb, DeviceFailure, DeviceFound, Pair, PairDevice, ProxyFilter, SearchRequest, oracle};
 use std::time::Duration;
 
 /// A fault of a device.
@@ -29,6 +29,8 @@ pub(super) enum Fault {
     TooFew,
     /// It adds pairs of boxes that are apart.
     TooMany,
+    /// It adds pairs of ids that have no box.
+    Nowhere,
     /// It leaves every second call to the CPU.
     Declines,
     /// It finds more pairs than it may.
@@ -47,10 +49,10 @@ impl Double {
         Box::new(Self { fault, is_software: false, calls: 0 })
     }
 
-    /// Spoils a right answer about so many boxes.
-    fn spoil(&mut self, found: &mut DeviceFound, boxes: usize) -> Result<(), DeviceFailure> {
+    /// Spoils a right answer about some boxes.
+    fn spoil(&mut self, found: &mut DeviceFound, all: &[Aabb]) -> Result<(), DeviceFailure> {
         self.calls += 1;
-        let (n, calls) = (boxes as u32, self.calls);
+        let (n, calls, boxes) = (all.len() as u32, self.calls, all.len());
         match self.fault {
             Fault::Fails if calls.is_multiple_of(2) => return Err(DeviceFailure::Failed("no luck".into())),
             Fault::Declines if calls.is_multiple_of(2) => {
@@ -73,6 +75,10 @@ impl Double {
             }
             Fault::TooFew => found.pairs.retain(|pair| (pair.a + pair.b).is_multiple_of(2)),
             Fault::TooMany => found.pairs.extend(some_pairs(boxes).step_by(4)),
+            Fault::Nowhere => {
+                let is_nowhere = |id: u32| !all[id as usize].is_valid();
+                found.pairs.extend(some_pairs(boxes).filter(|pair| is_nowhere(pair.a) || is_nowhere(pair.b)));
+            }
             _ => {}
         }
         Ok(())
@@ -97,7 +103,7 @@ impl PairDevice for Double {
         if found.pairs.len() as u64 > request.max_pairs && self.fault != Fault::IgnoresLimits {
             return Err(DeviceFailure::TooManyPairs);
         }
-        self.spoil(found, request.boxes.len())
+        self.spoil(found, request.boxes)
     }
 
     fn name(&self) -> Option<&str> {

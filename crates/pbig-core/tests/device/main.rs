@@ -137,7 +137,7 @@ fn searches_equal_those_of_the_cpu_whatever_fails() {
 
 #[test]
 fn lies_about_pairs_do_not_panic_and_end_with_a_new_start() {
-    for fault in [Fault::TooFew, Fault::TooMany, Fault::Twice] {
+    for fault in [Fault::TooFew, Fault::TooMany, Fault::Twice, Fault::Nowhere] {
         let (mut ours, mut rng) = (on_device(fault), StdRng::seed_from_u64(2));
         for update in 0..60 {
             // The CPU's engines go on from what the device has said.
@@ -145,6 +145,9 @@ fn lies_about_pairs_do_not_panic_and_end_with_a_new_start() {
             ours.set_backend(backend, Limits::DEFAULT);
             disturb(&mut [&mut ours], &mut rng);
             ours.update().expect("few pairs");
+            assert_eq!(ours.pairs().count(), ours.pair_count(), "{fault:?}, update {update}");
+            let are_there = |pair: Pair| ours.contains(pair.a) && ours.contains(pair.b);
+            assert!(ours.pairs().all(are_there), "{fault:?}, update {update}: pairs of removed boxes");
         }
         ours.clear();
         ours.set_device(Double::new(Fault::Nothing));
