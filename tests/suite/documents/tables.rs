@@ -68,10 +68,6 @@ pub(super) const TABLES: &[Table] = &[
         rows: &[("set", "uniform|mixed"), ("boxes", "100000|1000000|10000000")],
         columns: &[("set", "set"), ("boxes", "boxes"), ("pairs", "pairs"), ("CPU → GPU, ms", "cpu_ms → gpu_ms"),
             ("GPU alone, ms", "wait_ms")] },
-    Table { name: "gpu-compilers", csv: "gpu-compilers",
-        rows: &[("kernel", "locate|schedule|scatter|check_small|check_large|rank_windows")],
-        columns: &[("kernel", "kernel"), ("FXC, s", "seconds"), ("AMD, registers", "vgprs"),
-            ("AMD, waves a SIMD", "waves")] },
     // docs/ACCURACY.md
     Table { name: "index", csv: "accuracy-index-all-pairs",
         rows: &[("correction", "as it is")],
