@@ -6,7 +6,6 @@
 #   chromium      the same in headless Chromium
 #   fxc           Microsoft's compiler for DirectX, under wine: at most 5 seconds for each text
 #   amd           AMD's compiler in Mesa: registers, waves and spills of each kernel; nothing may spill
-#   table         the tables of the two compilers as docs/benchmarks/results/gpu-compilers.csv
 #   validation    the suite's GPU part under Khronos' validation layer: no message
 #   device        the suite's GPU part and every GPU benchmark on this machine's adapter, in at most eight minutes after the build.
 #                 The tables go to out/gpu/device; a software adapter runs small sizes. It runs only if it is named.
@@ -145,12 +144,6 @@ run_amd() {
     awk -F, 'NR > 1 && $4 != 0 { print $1 " spills registers"; faults++ } END { exit faults > 0 }' "$out/amd.csv"
 }
 
-# Both tables have the kernels in one order.
-run_table() {
-    needs "a table" "$out/fxc.csv" "$out/amd.csv" || return 0
-    paste -d , "$out/fxc.csv" <(cut -d , -f 2- "$out/amd.csv") >docs/benchmarks/results/gpu-compilers.csv
-}
-
 # validated CHECKS COMMAND...: runs a command under the validation layer, and fails if the layer has to say something.
 validated() {
     local checks=$1
@@ -215,7 +208,7 @@ run_device() {
 
 setup=true
 if [ "${1:-}" = --no-setup ]; then setup=false && shift; fi
-[ $# -gt 0 ] || set -- swiftshader dawn chromium fxc amd table validation
+[ $# -gt 0 ] || set -- swiftshader dawn chromium fxc amd validation
 if $setup; then scripts/setup.sh rust vulkan wasm page layers drivers || true; fi
 mkdir -p "$out"
 for name in "$@"; do

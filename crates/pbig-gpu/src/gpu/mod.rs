@@ -1,4 +1,4 @@
-//! The GPU backend: PBIG's pipeline in WGSL, on any device that wgpu supports. `docs/GPU.md` shows it, and says why it is right.
+//! The GPU backend: PBIG's pipeline in WGSL, on any device that wgpu supports. `shaders/README.md` shows it, and says why it is right.
 //!
 //! The kernels are in the crate `pbig-shaders`. The module `layout` has the structs that their buffers hold.
 
