@@ -15,7 +15,7 @@ const BOXES_OF_THREAD: usize = 4096;
 /// Pairs of indices.
 type Pairs = Vec<[u32; 2]>;
 
-/// Returns the edges of faces, each once: larger and then smaller vertex, sorted. The program `pbig` has the same rule.
+/// Returns the edges of faces, each once: smaller and then larger vertex, sorted by the larger one first, as in the program `pbig`.
 pub(crate) fn edges(faces: &[Keys]) -> Pairs {
     let vertices = sides(faces).map(|[larger, _]| larger as usize + 1).max().unwrap_or(0);
     if vertices > MAX_VERTICES_PER_FACE * faces.len() {
@@ -35,7 +35,7 @@ pub(crate) fn edges(faces: &[Keys]) -> Pairs {
     for (larger, end) in (0..).zip(&next[..vertices]) {
         let row = &mut smaller[start..*end];
         row.sort_unstable();
-        edges.extend(row.chunk_by(|v, w| v == w).map(|equal| [larger, equal[0]]));
+        edges.extend(row.chunk_by(|v, w| v == w).map(|equal| [equal[0], larger]));
         start = *end;
     }
     edges
@@ -46,6 +46,7 @@ fn sorted_edges(faces: &[Keys]) -> Pairs {
     let mut edges: Pairs = sides(faces).collect();
     edges.sort_unstable();
     edges.dedup();
+    edges.iter_mut().for_each(|edge| edge.reverse());
     edges
 }
 

@@ -41,9 +41,9 @@ def pairs(boxes):
 
 
 def edges(faces):
-    """Returns the edges: larger and smaller vertex, sorted."""
+    """Returns the edges: smaller and larger vertex, sorted by the larger one first."""
     sides = [side for face in faces for side in zip(face, [*face[1:], face[0]])]
-    return sorted({(max(side), min(side)) for side in sides if side[0] != side[1]})
+    return sorted({(min(side), max(side)) for side in sides if side[0] != side[1]}, key=lambda edge: edge[::-1])
 
 
 def elements(kind, vertex_count, faces):

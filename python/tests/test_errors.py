@@ -46,6 +46,10 @@ ERRORS = [
     (mesh(margin=np.inf), ValueError, "margin is inf; give a finite length of at least 0"),
     (mesh(margin=np.float32("nan")), ValueError, "margin is nan; give a finite length of at least 0"),
     (mesh(margin="1"), TypeError, "margin has the type str; give a number"),
+    (mesh(margin=True), TypeError, "margin has the type bool; give a number"),
+    (mesh(vertices="cloth.obj"), TypeError, "vertices has the type str; give an array of numbers"),
+    (mesh(faces=None), TypeError, "faces has the type NoneType; give an array of numbers"),
+    (mesh(faces=[[0, 1, 2], [3, 4]]), ValueError, "faces has rows of different lengths; give as many numbers in each"),
     (mesh(elements="ee,vx"), ValueError, "elements has 'vx'; give two of v (vertex), e (edge) and f (face), such as 'ee,vf'"),
     (mesh(elements=""), ValueError, "elements has ''; give two of"),
     (mesh(elements="eee"), ValueError, "elements has 'eee'; give two of"),
@@ -71,6 +75,28 @@ def test_an_error_says_what_and_where(call, kind, words):
     with pytest.raises(kind) as caught:
         call()
     assert words in str(caught.value)
+
+
+WARNINGS = [
+    ({"vertices": np.where(np.eye(8, 3) > 0, np.nan, 0)}, "vertices has 3 rows with a NaN, the first is row 0: elements there"),
+    ({"after": VERTICES - 1e39 * np.eye(8, 3, -2)}, "after has 3 rows beyond float32, the first is row 2: boxes there are infinite"),
+    ({"faces": [[0, 1, 2], [7, 7, 6]]}, "faces has 1 rows that name a vertex twice, the first is row 1: they stay"),
+    ({"faces": [[0, 1, 2, 0]]}, "faces has 1 rows that name a vertex twice, the first is row 0"),
+]
+
+
+@pytest.mark.parametrize("changes, words", WARNINGS, ids=[words for _, words in WARNINGS])
+def test_a_warning_says_what_and_where_and_points_at_the_caller(changes, words):
+    with pytest.warns(UserWarning) as caught:
+        mesh(**changes)()
+    assert [str(warning.message).startswith(words) for warning in caught] == [True]
+    assert caught[0].filename == __file__
+
+
+def test_sound_and_empty_meshes_are_silent(recwarn):
+    assert all(len(pairs) == 0 for pairs in mesh(faces=[])().values())
+    assert all(len(pairs) == 0 for pairs in mesh(vertices=[], faces=[], margin=np.array(0.5))().values())
+    assert len(pbig.pairs([])) == 0 and not recwarn.list
 
 
 def test_more_boxes_than_there_can_be_are_refused_before_they_are_copied():

@@ -106,8 +106,8 @@ def test_edges_are_numbered_by_larger_then_smaller_vertex(mesh):
 def test_edges_are_those_of_an_example():
     # Two triangles, and a quadrilateral.
     triangles = pbig.edges([[0, 1, 2], [2, 1, 3]]).tolist()
-    assert triangles == [[1, 0], [2, 0], [2, 1], [3, 1], [3, 2]]
-    assert pbig.edges([[1, 4, 6, 3]]).tolist() == [[3, 1], [4, 1], [6, 3], [6, 4]]
+    assert triangles == [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]
+    assert pbig.edges([[1, 4, 6, 3]]).tolist() == [[1, 3], [1, 4], [3, 6], [4, 6]]
 
 
 @pytest.mark.skipif("PBIG_PROGRAM" not in os.environ, reason="PBIG_PROGRAM does not name the program pbig")
@@ -119,5 +119,7 @@ def test_candidates_are_those_of_the_program(mesh, tmp_path):
     (tmp_path / "mesh.obj").write_text("\n".join(lines))
     for kinds, pairs in pbig.mesh_pairs(vertices, faces, elements="ee,vf,fe").items():
         command = [os.environ["PBIG_PROGRAM"], "pairs", "--mesh", "mesh.obj", "--elements", kinds, "-o", "pairs.npy"]
+        command += ["--edges", "edges.npy"]
         subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
         assert (np.load(tmp_path / "pairs.npy") == pairs).all(), kinds
+        assert (np.load(tmp_path / "edges.npy") == pbig.edges(faces)).all()

@@ -75,13 +75,14 @@ def mesh_pairs(
 ) -> dict[str, Pairs]:
     """Returns candidate pairs of elements of a mesh: elements that share no vertex, and whose boxes overlap.
 
-    An element pairs with nothing if one of its vertices has a NaN.
+    An element pairs with nothing if one of its vertices has a NaN. A UserWarning says so, and tells of vertices beyond
+    float32 and faces that name a vertex twice; `warnings.simplefilter("error")` makes errors of them.
 
     Args:
         vertices: float32 or float64, shape (n, 3): a place in a row.
         faces: Whole numbers, shape (m, 3) or (m, 4): the vertices of a face in a row, counted from 0.
         after: The vertices at the end of a step. A box then holds its element on the straight way there.
-        margin: Length by which each box grows on all sides, rounded outward.
+        margin: Length by which each box grows on all sides, rounded outward: half a thickness.
         elements: Entries of two kinds, v (vertex), e (edge) or f (face), with commas between them.
 
     Returns:
@@ -100,7 +101,8 @@ def mesh_pairs(
     """
     kinds = _checks.kinds(elements)
     before = _checks.vertices("vertices", vertices)
-    later = before if after is None else _checks.after(after, before)
+    later = before if after is None else _checks.vertices("after", after)
+    _checks.same_count(before, later)
     rows = _checks.faces(faces, len(before))
     found = _pbig.mesh_pairs((before, later), rows, _checks.margin(margin), [tuple(kind) for kind in kinds])
     return dict(zip(kinds, found))
@@ -113,13 +115,13 @@ def edges(faces: ArrayLike) -> Pairs:
         faces: As in `mesh_pairs`.
 
     Returns:
-        uint32, shape (k, 2): each edge once, its larger and then its smaller vertex, sorted.
+        uint32, shape (k, 2): each edge once, its smaller and then its larger vertex, sorted by the larger one first.
 
     Raises:
         TypeError, ValueError: As in `mesh_pairs`.
 
     >>> pbig.edges([[0, 1, 2], [2, 1, 3]]).tolist()
-    [[1, 0], [2, 0], [2, 1], [3, 1], [3, 2]]
+    [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]
     """
     return _pbig.edges(_checks.faces(faces, _pbig.MAX_BOXES))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numbers
+import warnings
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,13 @@ from ._pbig import MAX_BOXES
 # An unused place for the vertex of a face.
 NO_VERTEX = 2**32 - 1
 
+# The largest finite float32.
+LARGEST = float(np.finfo(np.float32).max)
+
 
 def boxes(name: str, values: ArrayLike) -> NDArray[Any]:
     """Returns boxes as rows of six numbers, without a copy if they are so already."""
-    array = np.asarray(values)
+    array = _array(name, values, 6)
     if array.shape[1:] not in ((6,), (2, 3)):
         raise _wrong_shape(name, array, "(n, 6), with min xyz and max xyz in a row, or (n, 2, 3)")
     _check_rows(name, array)
@@ -24,36 +28,41 @@ def boxes(name: str, values: ArrayLike) -> NDArray[Any]:
 
 
 def vertices(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Returns the places of vertices."""
-    array = np.asarray(values)
+    """Returns the places of vertices. Warns of those that are no places."""
+    array = _array(name, values, 3)
     if array.shape[1:] != (3,):
         raise _wrong_shape(name, array, "(n, 3), with the xyz of a vertex in a row")
     _check_rows(name, array)
     _float_type(name, array)
-    return np.require(array, np.float64, ["C", "A"])
+    places = np.require(array, np.float64, ["C", "A"])
+    if not (places.max(initial=0) <= LARGEST and places.min(initial=0) >= -LARGEST):
+        _warn(name, np.isnan(places).any(axis=1), "with a NaN", "elements there pair with nothing")
+        _warn(name, (np.abs(places) > LARGEST).any(axis=1), "beyond float32", "boxes there are infinite")
+    return places
 
 
-def after(values: ArrayLike, before: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the places of vertices at the end of a step."""
-    array = vertices("after", values)
-    if len(array) != len(before):
-        raise ValueError(f"after has {len(array)} rows, vertices {len(before)}; give all vertices at the end of the step")
-    return array
+def same_count(before: NDArray[np.float64], after: NDArray[np.float64]) -> None:
+    """Checks that both frames of a step have all vertices."""
+    if len(after) != len(before):
+        raise ValueError(f"after has {len(after)} rows, vertices {len(before)}; give all vertices at the end of the step")
 
 
 def faces(values: ArrayLike, vertex_count: int) -> NDArray[np.uint32]:
-    """Returns faces as rows of four vertices. A triangle has `NO_VERTEX` last."""
-    array = np.asarray(values)
+    """Returns faces as rows of four vertices. A triangle has `NO_VERTEX` last. Warns of faces that name a vertex twice."""
+    array = _array("faces", values, 3)
     if array.shape[1:] not in ((3,), (4,)):
         raise _wrong_shape("faces", array, "(n, 3) for triangles, or (n, 4) for quadrilaterals")
     rows = np.full((len(array), 4), NO_VERTEX, np.uint32)
     rows[:, : array.shape[1]] = _indices("faces", array, "the index of a vertex", vertex_count)
+    corners = array.T
+    are_doubled = [corners[i] == corners[j] for i in range(len(corners)) for j in range(i)]
+    _warn("faces", np.logical_or.reduce(are_doubled), "that name a vertex twice", "they stay, with fewer edges")
     return rows
 
 
 def ids(values: ArrayLike) -> NDArray[np.uint32]:
     """Returns ids of boxes."""
-    array = np.asarray(values)
+    array = _array("ids", values)
     if array.ndim != 1:
         raise _wrong_shape("ids", array, "(n,), with an id for each box")
     return np.require(_indices("ids", array, "an id", MAX_BOXES), np.uint32, ["C", "A"])
@@ -61,7 +70,8 @@ def ids(values: ArrayLike) -> NDArray[np.uint32]:
 
 def margin(value: float) -> float:
     """Returns a length by which boxes grow."""
-    if not isinstance(value, numbers.Real):
+    value = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
+    if not isinstance(value, numbers.Real) or isinstance(value, bool):
         raise TypeError(f"margin has the type {type(value).__name__}; give a number")
     if not 0 <= value < float("inf"):
         raise ValueError(f"margin is {value}; give a finite length of at least 0")
@@ -77,6 +87,25 @@ def kinds(text: str) -> list[str]:
         if len(entry) != 2 or not set(entry) <= set("vef"):
             raise ValueError(f"elements has '{entry}'; give two of v (vertex), e (edge) and f (face), such as 'ee,vf'")
     return entries
+
+
+def _array(name: str, values: ArrayLike, *columns: int) -> NDArray[Any]:
+    """Returns an array. An empty list has the columns that it should have."""
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{name} has rows of different lengths; give as many numbers in each") from None
+    if array.ndim == 0 and array.dtype.kind in "OUS":
+        raise TypeError(f"{name} has the type {type(values).__name__}; give an array of numbers")
+    return array.reshape(0, *columns) if array.shape == (0,) else array
+
+
+def _warn(name: str, are_odd: NDArray[np.bool_], what: str, result: str) -> None:
+    """Warns the caller of a function of the package of odd rows, if there are any."""
+    rows = np.flatnonzero(are_odd)
+    if len(rows) > 0:
+        # This function, its caller, and the package's function.
+        warnings.warn(f"{name} has {len(rows)} rows {what}, the first is row {rows[0]}: {result}", stacklevel=4)
 
 
 def _indices(name: str, array: NDArray[Any], what: str, limit: int) -> NDArray[Any]:
