@@ -103,7 +103,7 @@ members() { { echo "$project/Cargo.toml" && grep -oE '"manifest_path":"[^"]*"' <
 # lines_to_remove: a line "FILE:NUMBER:TEXT" for each line of a manifest that names pbig's crates or a patched copy.
 lines_to_remove() {
     members | while read -r manifest; do
-        is_own "$manifest" || grep -HnE 'rapier[23]d(-f64)?-pbig|patched/rapier[23]d' "$manifest" || true
+        is_own "$manifest" || grep -HnE 'rapier[23]d(-f64)?-pbig|patched/rapier[23]d|exclude.*"patched"' "$manifest" || true
     done
 }
 
@@ -114,7 +114,7 @@ if $is_undo; then
     [ -n "$lines" ] || lines="(no manifest names pbig's crates or a copy)"
     cat <<TEXT
 Removed the copies in $project/patched.
-Remove pbig's calls from the code, and these lines from the manifests:
+Remove pbig's calls from the code, and these lines from the manifests, with [patch.crates-io] if nothing is left in it:
 
 $lines
 TEXT

@@ -99,6 +99,7 @@ impl<T: Tree> Colliders<T> {
     pub fn set_aabbs(&mut self, margins: &Margins, moved: impl Iterator<Item = (Handle, T::Aabb)>) {
         self.set_margin(margins.usual);
         for (handle, aabb) in moved {
+            self.counts.moved += 1;
             if let Some(margin) = margins.own(&aabb, false) {
                 self.set_margin(margin);
             }
@@ -158,7 +159,7 @@ impl<T: Tree> Colliders<T> {
         let has_changes = modified + removed > 0 || self.differs_from(scene);
         let _span = tracing::debug_span!(target: "pbig", "update", modified).entered();
         let totals = Totals { updates: self.counts.totals.updates + 1, ..self.counts.totals };
-        self.counts = Counts { modified, removed, totals, ..Counts::default() };
+        self.counts = Counts { modified: modified + self.counts.moved, removed, totals, ..Counts::default() };
         (self.last_error, self.is_idle) = (None, false);
         // A shape may panic in the middle.
         self.tree.expire();
@@ -177,7 +178,10 @@ impl<T: Tree> Colliders<T> {
             && scene.removed().next().is_none()
             && self.has_no_changes()
             && !self.differs_from(scene);
-        self.counts.totals.updates += u64::from(skips);
+        if skips {
+            self.counts.modified = std::mem::take(&mut self.counts.moved);
+            self.counts.totals.updates += 1;
+        }
         skips
     }
 

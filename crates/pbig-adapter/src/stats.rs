@@ -11,7 +11,7 @@ use pbig_core::Report;
 pub struct Stats<'a> {
     /// Known colliders, disabled ones included.
     pub colliders: usize,
-    /// Colliders that rapier listed as modified.
+    /// Colliders that rapier listed as modified, and boxes that the step before moved: in rapier 0.36 these are not listed.
     pub modified: usize,
     /// Colliders that rapier listed as removed or disabled.
     pub removed: usize,
@@ -45,6 +45,8 @@ pub struct Totals {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Counts {
     pub(crate) modified: usize,
+    /// Boxes moved by steps since the last update.
+    pub(crate) moved: usize,
     pub(crate) removed: usize,
     pub(crate) added: usize,
     pub(crate) deleted: usize,
@@ -62,7 +64,7 @@ impl Counts {
 impl<T: Tree> Colliders<T> {
     /// Returns the counts of the last update.
     pub fn stats(&self) -> Stats<'_> {
-        let Counts { modified, removed, added, deleted, totals } = self.counts;
+        let Counts { modified, removed, added, deleted, totals, .. } = self.counts;
         let (colliders, report) = (self.registry.len(), self.core.report());
         Stats { colliders, modified, removed, added, deleted, totals, report }
     }

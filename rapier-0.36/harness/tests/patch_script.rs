@@ -181,9 +181,12 @@ fn every_member_that_uses_rapier_is_named_with_its_lines() {
         let printed = project.run(&[folder]).expect("success");
         assert!(!printed.contains("crates/old") && !printed.contains("crates/none"), "{printed}");
     }
-    project
-        .write("crates/tests/Cargo.toml", &(package("tests") + "[dependencies]\n\nrapier2d-pbig = \"1\"\n"));
-    let wanted = "\nPROJECT/crates/tests/Cargo.toml:6:rapier2d-pbig = \"1\"\n";
+    project.write(
+        "crates/tests/Cargo.toml",
+        &(package("tests") + "exclude = [\"patched\"]\n[dependencies]\nrapier2d-pbig = \"1\"\n"),
+    );
+    let file = "PROJECT/crates/tests/Cargo.toml";
+    let wanted = &format!("\n{file}:4:exclude = [\"patched\"]\n{file}:6:rapier2d-pbig = \"1\"\n");
     project.prints(wanted, &["--undo", "crates/none"]);
 }
 

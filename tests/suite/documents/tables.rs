@@ -42,8 +42,10 @@ pub(super) const TABLES: &[Table] = &[
         columns: &[("queries", "queries"), ("frame", FRAME),
             ("its queries", "stock_queries_mean_ms → pbig_queries_mean_ms")] },
     Table { name: "crates", csv: "crates-036",
-        rows: &[("scene", "rain|city"), ("bodies", "100000"), ("queries", "none")],
-        columns: &[("crate", "crate"), ("scene", "scene"), ("broad phase", BROAD), ("frame", FRAME)] },
+        rows: &[
+            ("crate", "rapier2d|rapier3d-f64"), ("scene", "rain|city"), ("bodies", "1000|10000|100000"),
+            ("queries", "none")],
+        columns: &[("crate", "crate"), ("scene", "scene"), ("bodies", "bodies"), ("broad phase", BROAD), ("frame", FRAME)] },
     Table { name: "steps-027", csv: "step",
         rows: &[("scene", "column|pile|mixed"), ("bodies", "10000")],
         columns: &[("scene", "scene"), ("bodies", "bodies"), ("broad phase", BROAD),
