@@ -226,9 +226,6 @@ run_pictures() {
     # Each for the time of its 8 steps, in ms.
     img2webp -loop 0 -lossy -q 45 -m 4 -d 133 "$work"/falling/*.png -o "$images/falling.webp"
     at_most 3000000 "$images/falling.webp"
-    step "$viewer" --scene column --bodies 10000 --seed 1 --backend cpu --colour contacts --size 1280x800 \
-        --steps 200 --every 200 --frames "$work/viewer"
-    pack "$images/viewer.png" "$work/viewer/00200.png"
 }
 
 # Optimized a little, with overflow checks and debug assertions. The thread sanitizer has to instrument the standard library:
