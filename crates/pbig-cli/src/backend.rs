@@ -73,15 +73,17 @@ impl BackendArgs {
         of_gpu.into_iter().find_map(|(option, is_given)| is_given.then_some(option))
     }
 
-    /// Warns of a software adapter. If a GPU is required and did not do all the work, fails with the reason.
+    /// Warns of a software adapter, and of work that no GPU did. If a GPU is required and did not do all the work, fails with the reason.
     pub(crate) fn check_use(&self, adapter: Option<&str>, fallback: Option<&str>) -> Result<(), Failure> {
         if let (true, Some(why)) = (self.require_gpu, no_gpu(adapter, fallback)) {
             return Err(Failure::Check(format!("--require-gpu: {why}")));
         }
-        if let Some(name) = adapter.filter(|name| is_software(name)) {
-            warn(&format!(
+        match (adapter, fallback) {
+            (Some(name), _) if is_software(name) => warn(&format!(
                 "{name} is a program on the CPU, slower than --backend cpu; `pbig doctor` says why no GPU is found"
-            ));
+            )),
+            (None, Some(why)) => warn(&format!("{}; `pbig doctor` says more", plain(why))),
+            _ => {}
         }
         Ok(())
     }

@@ -96,14 +96,37 @@ fn advice(candidates: &[Candidate]) -> Option<String> {
     if !candidates.iter().all(is_software) {
         return None;
     }
-    let api = std::env::var("WGPU_BACKEND");
-    Some(api.map_or(INSTALL.into(), |api| {
-        format!("no GPU is found: WGPU_BACKEND={api:?} leaves out other APIs; unset it")
-    }))
+    let causes = [wrong_api(), missing_driver()].into_iter().flatten();
+    Some(format!("no GPU is found: {}{INSTALL}", causes.map(|cause| cause + "; ").collect::<String>()))
 }
 
-const INSTALL: &str = "no GPU is found: install its driver with Vulkan (NVIDIA: the vendor's; AMD and Intel: mesa-vulkan-drivers on Debian and \
-                       Ubuntu). A container must be given the GPU; NVIDIA's also needs NVIDIA_DRIVER_CAPABILITIES=graphics,compute,utility";
+/// The API of this system for which pbig's kernels are compiled first.
+const API: &str = if cfg!(windows) {
+    "dx12"
+} else if cfg!(target_vendor = "apple") {
+    "metal"
+} else {
+    "vulkan"
+};
+
+const INSTALL: &str = "install its driver with Vulkan (NVIDIA: the vendor's; AMD and Intel: mesa-vulkan-drivers on Debian and Ubuntu) and \
+                       Vulkan's loader (libvulkan1). A container must be given the GPU; NVIDIA's also needs \
+                       NVIDIA_DRIVER_CAPABILITIES=graphics,compute,utility";
+
+fn wrong_api() -> Option<String> {
+    let api = std::env::var("WGPU_BACKEND").ok()?;
+    let has_own = api.to_lowercase().contains(API);
+    (!has_own).then(|| format!("WGPU_BACKEND={api:?} leaves out {API}: unset it"))
+}
+
+/// Returns what is wrong with the variables that name Vulkan's drivers.
+fn missing_driver() -> Option<String> {
+    ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].into_iter().find_map(|variable| {
+        let files = std::env::var_os(variable)?;
+        let missing = std::env::split_paths(&files).find(|file| !file.exists())?;
+        Some(format!("{variable} names {}, which does not exist: unset it", missing.display()))
+    })
+}
 
 /// Returns all that the text says, as JSON.
 fn object(candidates: &[Candidate], chosen: &Chosen, tested: &[Tested]) -> serde_json::Value {

@@ -70,6 +70,14 @@ fn a_required_gpu_that_is_missing_is_a_failure_without_output() {
         let line = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{line}");
         assert!(line.starts_with("pbig: --require-gpu: the CPU did work: no GPU adapter named"), "{line}");
+        let args = [command, &["--backend", "gpu", "--json"]].concat();
+        let warned = pbig_where(folder.path(), "WGPU_ADAPTER_NAME", "no such adapter", &args);
+        let line = String::from_utf8_lossy(&warned.stderr).into_owned();
+        let words = "the CPU did work: no GPU adapter named \"no such adapter\"; found: ";
+        assert!(
+            warned.status.success() && line.contains(words) && line.contains("; `pbig doctor` says more"),
+            "{line}"
+        );
         for option in [&["--require-gpu"][..], &["--adapter", "x"]] {
             refused(
                 &pbig(folder.path(), &[command, option].concat()),
@@ -118,9 +126,16 @@ fn doctor_obeys_what_pairs_obeys() {
     let (text, object) = doctor("WGPU_BACKEND", if cfg!(target_os = "windows") { "metal" } else { "dx12" });
     assert!(text.contains("adapters: none; `--backend gpu` falls back to the CPU: no GPU adapter; found: none; WGPU_BACKEND="), "{text}");
     assert!(
-        text.contains("leaves out other APIs; unset it\n") && object["adapters"] == serde_json::json!([]),
+        text.contains(": unset it; install its driver with Vulkan")
+            && object["adapters"] == serde_json::json!([]),
         "{text}"
     );
+    if cfg!(target_os = "linux") {
+        let (text, _) = doctor("VK_DRIVER_FILES", "/no/such.json");
+        let cause =
+            "no GPU is found: VK_DRIVER_FILES names /no/such.json, which does not exist: unset it; install";
+        assert!(text.contains(cause) && !text.contains("WGPU_BACKEND"), "{text}");
+    }
     let (text, object) = doctor("RAYON_NUM_THREADS", "1");
     assert!(
         text.contains(&format!(": {name}, driver")) && text.contains(", used by `--backend gpu`\n"),
