@@ -19,7 +19,7 @@
 //! app.update();
 //! ```
 //!
-//! With collision hooks, name them twice: `disable::<BvhBroadPhasePlugin<MyHooks>>()` and
+//! With collision hooks, name them here, too: `disable::<BvhBroadPhasePlugin<MyHooks>>()` and
 //! `add(PbigBroadPhasePlugin::<MyHooks>::default())`.
 //!
 //! The pairs are those of avian's own broad phase, in each step. [`PbigBroadPhasePlugin::as_shadow`] compares both in a running
@@ -110,13 +110,16 @@ where
     }
 
     fn finish(&self, app: &mut App) {
+        if !app.world().contains_resource::<ContactGraph>() {
+            warn!("avian's `PhysicsPlugins` are missing: pbig finds pairs for them");
+        }
         lost::add_observers(app.world_mut());
         match (self.is_shadow, app.is_plugin_added::<BvhBroadPhasePlugin<H>>()) {
             (false, true) => warn!(
-                "avian's own broad phase runs beside pbig: `.disable::<BvhBroadPhasePlugin>()` saves its time"
+                "avian's own broad phase runs beside pbig: `.disable::<BvhBroadPhasePlugin>()`, or `<BvhBroadPhasePlugin<MyHooks>>`, saves its time"
             ),
             (true, false) => warn!(
-                "avian's own broad phase is missing, or has other hooks: leave out `.as_shadow()`, or pbig compares with nothing"
+                "avian's own broad phase is missing: leave out `.as_shadow()`; or it has other hooks: add `PbigBroadPhasePlugin::<MyHooks>::default().as_shadow()`"
             ),
             _ => {}
         }

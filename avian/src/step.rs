@@ -9,6 +9,7 @@ use avian::prelude::*;
 use bevy::ecs::system::{StaticSystemParam, SystemParam, SystemParamItem};
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
+use std::any::TypeId;
 use std::ops::Deref;
 
 /// The boxes, and the parts of a world that decide about a contact.
@@ -70,8 +71,16 @@ where
         {
             return false;
         }
-        !one.flags.union(other.flags).contains(ColliderTreeProxyFlags::CUSTOM_FILTER)
-            || self.hooks.filter_pairs(one.collider, other.collider, &mut self.commands)
+        if !one.flags.union(other.flags).contains(ColliderTreeProxyFlags::CUSTOM_FILTER) {
+            return true;
+        }
+        if TypeId::of::<H>() == TypeId::of::<()>() {
+            warn_once!(
+                "colliders have `ActiveCollisionHooks::FILTER_PAIRS`, but pbig has no hooks, and filters none: \
+                 name them in `PbigBroadPhasePlugin::<MyHooks>::default()` and `.disable::<BvhBroadPhasePlugin<MyHooks>>()`"
+            );
+        }
+        self.hooks.filter_pairs(one.collider, other.collider, &mut self.commands)
     }
 }
 

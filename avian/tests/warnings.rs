@@ -46,7 +46,10 @@ fn warnings(plugins: PluginGroupBuilder) -> Vec<String> {
     let warnings = Warnings::default();
     tracing::subscriber::with_default(warnings.clone(), || {
         let mut app = app(plugins);
-        app.world_mut().spawn((RigidBody::Dynamic, support::collider(1.0), Transform::default()));
+        let hooks = ActiveCollisionHooks::FILTER_PAIRS;
+        for _ in 0..2 {
+            app.world_mut().spawn((RigidBody::Dynamic, support::collider(1.0), Transform::default(), hooks));
+        }
         (0..3).for_each(|_| app.update());
     });
     std::mem::take(&mut warnings.0.lock().expect("texts"))
@@ -67,6 +70,13 @@ fn a_shadow_of_no_broad_phase_warns_once() {
 fn two_broad_phases_in_charge_warn_once() {
     let texts = warnings(plugins().add(pbig()));
     assert!(matches!(&texts[..], [text] if text.contains("disable")), "{texts:?}");
+}
+
+#[test]
+fn colliders_that_ask_for_hooks_warn_once_if_pbig_has_none() {
+    let without = plugins().disable::<BvhBroadPhasePlugin<Veto>>();
+    let texts = warnings(without.add(PbigBroadPhasePlugin::new()));
+    assert!(matches!(&texts[..], [text] if text.contains("FILTER_PAIRS")), "{texts:?}");
 }
 
 #[test]
