@@ -2,10 +2,10 @@
 
 use super::OUR_GRID;
 use super::printed::*;
-use super::sides::{Setup, Way, effort, race};
+use super::sides::{ON_GPU, Setup, Way, effort, race};
 use crate::UNSORTED;
 use pbig_core::{Backend, BroadPhase, Config, Finder, ProxyFilter};
-use pbig_harness::gpu_race;
+use pbig_harness::motions::{Density, Motion, MovingBoxes};
 use pbig_harness::prelude::*;
 
 /// The distance that cubes with edges of 1 move in a step, along each axis.
@@ -23,8 +23,9 @@ fn brute_force_and_grid() -> Result<Table, Failure> {
         ms printed: without grid | ms printed: with grid";
     let mut table = Table::new("Avril figure 4 and table 7: brute force, with and without a grid", columns);
     for n in [100usize, 500, 1000, 2500, 5000, 10_000] {
+        let boxes = BoxSet::named("unit").expect("a set of the harness").boxes(n, 1);
         let ways = [BRUTE, Way::Finder(OUR_GRID), Way::Avril];
-        let cpu = race(&ways, None, cubes(n, 1.0, 1.0, 1), DISTANCE, effort(n))?;
+        let cpu = race(&ways, None, boxes, DISTANCE, effort(n))?;
         let ms = cpu.iter().map(|call| call.median);
         let printed = AVRIL_7.iter().find(|row| row.0 == n);
         let printed = [printed.map(|row| row.1), printed.map(|row| row.2)];
@@ -33,46 +34,53 @@ fn brute_force_and_grid() -> Result<Table, Failure> {
     Ok(table)
 }
 
-/// Table 6 and figure 5: a step in which all move. Ours: cubes with a pair each that move by up to a tenth of
-/// their edge: `BroadPhase::set_many`, then `update`, events included, beside a search from nothing; on the CPU means, on a
-/// device medians of a few updates.
+/// The sides of a step.
+const SIDES: [&str; 3] = ["ours, CPU", "ours, CPU, from nothing", "ours, GPU"];
+
+/// Table 6 and figure 5: a step in which all move. Ours: cubes with a pair each that move by up to a tenth of their edge:
+/// `BroadPhase::set_many`, then `update`, events included, beside a search from nothing; means.
 fn steps(setup: &Setup) -> Result<Table, Failure> {
     let mut table = Table::new("Avril table 6 and figure 5: a step", "objects | side | pairs | whole, ms");
     let most = if setup.quick { 100_000 } else { usize::MAX };
     for (n, printed) in AVRIL_6.into_iter().filter(|(n, _)| *n <= most) {
         table.row(cells![n, "printed", (), printed]);
-        let boxes = || cubes(n, 1.0, 1.0, 1);
-        let (pairs, ms) = step(Wander::new(boxes(), 1.0, DISTANCE), Effort::new(setup.quick))?;
-        for (side, ms) in ["ours, CPU", "ours, CPU, from nothing"].into_iter().zip(ms) {
-            table.row(cells![n, side, pairs, ms.mean]);
-        }
-        if let Some(gpu) = setup.for_boxes(n) {
-            let raced = gpu_race::race(gpu, boxes(), 1.0, DISTANCE)?;
-            table.row(cells![n, "ours, GPU", raced.pairs, raced.ms[1]]);
+        let (pairs, times) = step(n, setup)?;
+        for (side, took) in SIDES.into_iter().zip(times) {
+            table.row(cells![n, side, pairs, took.mean]);
         }
     }
     Ok(table)
 }
 
-/// Measures an update, and a search from nothing, in turn. Returns the pairs, too.
-fn step(wander: Wander, effort: Effort) -> Result<(usize, Vec<Took>), Failure> {
-    let (mut finder, mut broad_phase) = (Finder::new(UNSORTED), BroadPhase::new(UNSORTED)?);
-    let all: Vec<u32> = (0..wander.boxes.len() as u32).collect();
-    let prepare = |(wander, moved): &mut (Wander, Vec<u32>), round| {
-        let now = wander.step(round);
-        // In the first round all are new.
+/// Measures an update, a search from nothing, and an update on the device, if there is one for this number, in turn. Returns the pairs,
+/// too.
+fn step(n: usize, setup: &Setup) -> Result<(usize, Vec<Took>), Failure> {
+    let mut finder = Finder::new(UNSORTED);
+    let mut kept = vec![BroadPhase::new(UNSORTED)?];
+    if let Some(gpu) = setup.for_boxes(n) {
+        kept.push(BroadPhase::with_device(ON_GPU, Box::new(gpu.clone()))?);
+    }
+    // In the first round all are new.
+    let mut state = (MovingBoxes::new(Motion::Swing, Density::Sparse, n, 1), (0..n as u32).collect());
+    let prepare = |(moving, moved): &mut (MovingBoxes, Vec<u32>), round| {
         if round > 0 {
-            *moved = now;
+            moved.clear();
+            moved.extend(moving.step());
         }
     };
-    let took = measured(&mut (wander, all), 2, effort, prepare, |(wander, moved), side| {
-        let of = |id: u32| Some((wander.boxes[id as usize], ProxyFilter::ALL));
-        let (done, ms) = timed(|| match side {
-            0 => broad_phase.set_many(moved, of).and_then(|()| broad_phase.update().map(|_| ())),
-            _ => finder.find(&wander.boxes).map(|_| ()),
-        });
-        Ok(done.map(|()| ms)?)
-    })?;
-    check(broad_phase.pair_count() == finder.pairs().len(), || "an update and a search differ".into())?;
+    let took =
+        measured(&mut state, 1 + kept.len(), Effort::new(setup.quick), prepare, |(moving, moved), side| {
+            let of = |id: u32| Some((moving.boxes()[id as usize], ProxyFilter::ALL));
+            let (done, ms) = timed(|| match side {
+                1 => finder.find(moving.boxes()).map(|_| ()),
+                _ => kept[side / 2].set_many(moved, of).and_then(|()| kept[side / 2].update().map(|_| ())),
+            });
+            Ok(done.map(|()| ms)?)
+        })?;
+    for one in &kept {
+        let fallback = one.report().fallback.clone();
+        check(fallback.is_none(), || fallback.unwrap_or_default())?;
+        check(one.pair_count() == finder.pairs().len(), || "an update and a search differ".into())?;
+    }
     Ok((finder.pairs().len(), took))
 }
