@@ -5,33 +5,30 @@
 
 use crate::UNSORTED;
 use crate::trees::{Changed, Kept, Obvhs, Parry, Refit, for_parry, parry_rebuilt, partition};
-use pbig_core::{Aabb, Finder};
+use pbig_core::Finder;
+use pbig_harness::motions::{Density, Motion, MovingBoxes};
 use pbig_harness::prelude::*;
 
-/// Returns the distance that a box of a set moves between two frames, along each axis. Settled boxes hardly move.
-fn distance(set: &str) -> f32 {
-    if set == "pile" { 0.02 } else { 0.1 }
-}
+/// Boxes, and how many.
+type PeerCase = (Density, usize);
 
-/// A set of boxes, and how many.
-type PeerCase = (&'static str, usize);
-
-const LARGE: [PeerCase; 4] = [("unit", 100_000), ("unit", 1_000_000), ("mixed", 100_000), ("pile", 100_000)];
-const SMALL: [PeerCase; 3] = [("unit", 10_000), ("mixed", 10_000), ("pile", 10_000)];
-
-/// The share of boxes that swing to and fro; none: all drift, on and on.
-type MovedShare = Option<f64>;
+const LARGE: [PeerCase; 4] = [
+    (Density::Sparse, 100_000),
+    (Density::Sparse, 1_000_000),
+    (Density::Mixed, 100_000),
+    (Density::Dense, 100_000),
+];
+const SMALL: [PeerCase; 3] = [(Density::Sparse, 10_000), (Density::Mixed, 10_000), (Density::Dense, 10_000)];
 
 /// Measures all cases. Fails if the sides have different numbers of pairs.
 pub fn run(quick: bool) -> Result<BenchReport, Failure> {
     let (effort, mut table) = (Effort::new(quick), Table::new("peers", COMPARED));
     let cases: &[PeerCase] = if quick { &SMALL } else { &LARGE };
-    let drift: &[PeerCase] = if quick { &[] } else { &[LARGE[0], LARGE[3]] };
-    let parts = if quick { &SMALL[..1] } else { &LARGE[..2] };
+    let parts = &cases[..if quick { 1 } else { 2 }];
     for (what, motion, cases) in [
-        ("events, all moved", Some(1.0), cases),
-        ("events, all drift", None, drift),
-        ("events, 1% moved", Some(0.01), parts),
+        ("events, all moved", Motion::Swing, cases),
+        ("events, all drift", Motion::Drift, &parts[..1]),
+        ("events, 1% moved", Motion::Few, parts),
     ] {
         tracked(cases, what).try_for_each(|case| frames(what, *case, motion, effort, &mut table))?;
     }
@@ -39,8 +36,9 @@ pub fn run(quick: bool) -> Result<BenchReport, Failure> {
     Ok(BenchReport::new("peers", vec![table]))
 }
 
-fn named((set, boxes): PeerCase) -> Vec<Aabb> {
-    BoxSet::named(set).expect("a set of the harness").boxes(boxes, 1)
+/// Returns the name of a case. Sparse boxes are those of the set `unit`.
+fn named(what: &str, density: Density) -> String {
+    format!("{what}, {}", if density == Density::Sparse { "unit" } else { density.name() })
 }
 
 fn agree(name: &str, ours: usize, others: &[usize]) -> Result<u64, Failure> {
@@ -50,22 +48,22 @@ fn agree(name: &str, ours: usize, others: &[usize]) -> Result<u64, Failure> {
 
 /// Pbig and parry's trees through the same frames.
 struct PeerFrames {
-    wander: Wander,
+    boxes: MovingBoxes,
     changed: Changed,
     ours: Kept,
     trees: Vec<Parry>,
 }
 
 impl PeerFrames {
-    fn prepare(&mut self, round: usize) {
-        let moved = self.wander.step(round);
-        self.trees.iter_mut().for_each(|tree| tree.prepare(&self.wander.boxes, &moved));
-        self.changed = partition(&self.wander.boxes, &moved);
+    fn prepare(&mut self, _: usize) {
+        let moved = self.boxes.step().to_vec();
+        self.trees.iter_mut().for_each(|tree| tree.prepare(self.boxes.boxes(), &moved));
+        self.changed = partition(self.boxes.boxes(), &moved);
     }
 
     fn run(&mut self, side: usize) -> Result<f64, Failure> {
         match side {
-            0 | 1 => self.ours.update(side, &self.wander.boxes, &self.changed),
+            0 | 1 => self.ours.update(side, self.boxes.boxes(), &self.changed),
             _ => Ok(timed(|| self.trees[side - 2].frame()).1),
         }
     }
@@ -81,22 +79,17 @@ const REFITS: [(&str, Refit); 3] = [
 /// Measures a case frame by frame.
 fn frames(
     what: &str,
-    case: PeerCase,
-    motion: MovedShare,
+    (density, n): PeerCase,
+    motion: Motion,
     effort: Effort,
     table: &mut Table,
 ) -> Result<(), Failure> {
-    let (name, boxes) = (format!("{what}, {}", case.0), named(case));
-    let is_partial = motion.is_some_and(|share| share < 1.0);
-    let refits = if is_partial { &REFITS[..1] } else { &REFITS[1..] };
-    let trees: Vec<Parry> = refits.iter().map(|(_, refit)| Parry::new(&boxes, *refit)).collect();
+    let (name, boxes) = (named(what, density), MovingBoxes::new(motion, density, n, 1));
+    let refits = if motion == Motion::Few { &REFITS[..1] } else { &REFITS[1..] };
+    let trees: Vec<Parry> = refits.iter().map(|(_, refit)| Parry::new(boxes.boxes(), *refit)).collect();
     let sides = 2 + trees.len();
-    let wander = match motion {
-        Some(share) => Wander::new(boxes, share, distance(case.0)),
-        None => Wander::drifting(boxes, distance(case.0)),
-    };
-    let changed = ((0..case.1 as u32).collect(), vec![]);
-    let mut state = PeerFrames { wander, changed, ours: Kept::new(UNSORTED)?, trees };
+    let changed = ((0..n as u32).collect(), vec![]);
+    let mut state = PeerFrames { boxes, changed, ours: Kept::new(UNSORTED)?, trees };
     for side in [0, 1] {
         state.run(side)?;
     }
@@ -106,27 +99,26 @@ fn frames(
     let theirs: Vec<usize> = trees.iter_mut().map(Parry::all_pairs).collect();
     let pairs = agree(&name, all, &[vec![lone], theirs].concat())?;
     for ((tree, _), &theirs) in refits.iter().zip(&times[2..]) {
-        table.row(compared(&name, case.1, pairs, MS, times[0], (tree, theirs)));
+        table.row(compared(&name, n, pairs, MS, times[0], (tree, theirs)));
     }
     let alone = format!("{name}, ours on one thread");
-    table.row(compared(&alone, case.1, pairs, MS, times[1], (refits[0].0, times[2])));
+    table.row(compared(&alone, n, pairs, MS, times[1], (refits[0].0, times[2])));
     Ok(())
 }
 
 /// Measures all pairs from nothing, of boxes that are elsewhere in each round.
-fn from_scratch(case: PeerCase, effort: Effort, table: &mut Table) -> Result<(), Failure> {
-    let name = format!("from scratch, {}", case.0);
+fn from_scratch((density, n): PeerCase, effort: Effort, table: &mut Table) -> Result<(), Failure> {
+    let name = named("from scratch", density);
     let (mut ours, mut found, mut pairs) = (Finder::new(UNSORTED), vec![], [0; 3]);
-    let wander = Wander::new(named(case), 1.0, distance(case.0));
-    let mut state = (wander, vec![], Obvhs::default());
-    let prepare = |(wander, parry, obvhs): &mut (Wander, Vec<_>, Obvhs), round| {
-        wander.step(round);
-        *parry = wander.boxes.iter().map(for_parry).collect();
-        obvhs.prepare(&wander.boxes);
+    let mut state = (MovingBoxes::new(Motion::Swing, density, n, 1), vec![], Obvhs::default());
+    let prepare = |(moving, parry, obvhs): &mut (MovingBoxes, Vec<_>, Obvhs), _| {
+        moving.step();
+        *parry = moving.boxes().iter().map(for_parry).collect();
+        obvhs.prepare(moving.boxes());
     };
-    let times = measured(&mut state, 3, effort, prepare, |(wander, parry, obvhs), side| {
+    let times = measured(&mut state, 3, effort, prepare, |(moving, parry, obvhs), side| {
         let (count, ms) = match side {
-            0 => timed(|| ours.find(&wander.boxes).map(<[_]>::len)),
+            0 => timed(|| ours.find(moving.boxes()).map(<[_]>::len)),
             1 => timed(|| Ok(parry_rebuilt(parry, &mut found))),
             _ => timed(|| Ok(obvhs.rebuilt(&mut found))),
         };
@@ -135,7 +127,7 @@ fn from_scratch(case: PeerCase, effort: Effort, table: &mut Table) -> Result<(),
     })?;
     let pairs = agree(&name, pairs[0], &pairs[1..])?;
     for (other, theirs) in [("parry 0.31 rebuilt", times[1]), ("obvhs 0.4 ploc", times[2])] {
-        table.row(compared(&name, case.1, pairs, MS, times[0], (other, theirs)));
+        table.row(compared(&name, n, pairs, MS, times[0], (other, theirs)));
     }
     Ok(())
 }

@@ -2,12 +2,10 @@
 
 use crate::choice::Choice;
 use crate::run::Run;
-use pbig_scenes::drawn::{Drawn, Kind, Member, Part, Triangles};
+use pbig_scenes::drawn::{Drawn, Kind, Member, Triangles};
 use pbig_scenes::scenes::Scene;
 use pbig_scenes::times::StepTime;
-use pbig_scenes::world::World;
 use rapier3d::na::Matrix4;
-use rapier3d::prelude::{Isometry, Real};
 use std::sync::{Mutex, PoisonError};
 use wasm_bindgen::prelude::*;
 
@@ -182,7 +180,12 @@ impl Simulation {
 
     /// Returns a matrix of 16 floats for each part, group by group, column by column.
     pub fn matrices(&self) -> Vec<f32> {
-        matrices(&self.drawn, &self.run.world)
+        let mut floats = Vec::with_capacity(16 * self.drawn.members.len());
+        for Member { collider, part, .. } in &self.drawn.members {
+            let collider = self.run.world.colliders.get(*collider);
+            floats.extend_from_slice(collider.map_or_else(Matrix4::zeros, |it| part.matrix(it)).as_slice());
+        }
+        floats
     }
 }
 
@@ -203,35 +206,6 @@ fn mesh_data((points, triangles): &Triangles) -> MeshData {
     MeshData { coordinates, indices: triangles.as_flattened().to_vec() }
 }
 
-/// Returns the matrix of each part at the present pose of its collider, column by column.
-fn matrices(drawn: &Drawn, world: &World) -> Vec<f32> {
-    let mut floats = Vec::with_capacity(16 * drawn.members.len());
-    for Member { collider, part, .. } in &drawn.members {
-        let collider = world.colliders.get(*collider);
-        let matrix = collider.map_or_else(Matrix4::zeros, |it| matrix(it.position(), part));
-        floats.extend_from_slice(matrix.as_slice());
-    }
-    floats
-}
-
-fn matrix(pose: &Isometry<Real>, part: &Part) -> Matrix4<f32> {
-    (pose * part.local).to_homogeneous().prepend_nonuniform_scaling(&part.scale)
-}
-
 fn to_js(message: String) -> JsError {
     JsError::new(&message)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use rapier3d::prelude::*;
-
-    #[test]
-    fn a_matrix_scales_then_places() {
-        let mut world = World::default();
-        world.colliders.insert(ColliderBuilder::cuboid(1.0, 2.0, 3.0).translation(vector![4.0, 5.0, 6.0]));
-        let wanted = [1., 0., 0., 0., 0., 2., 0., 0., 0., 0., 3., 0., 4., 5., 6., 1.];
-        assert_eq!(matrices(&Drawn::new(&world), &world), wanted);
-    }
 }

@@ -74,26 +74,6 @@ mod tests {
         Some(oracle::pairs_filtered(boxes, filters.unwrap_or(&vec![ProxyFilter::ALL; boxes.len()])))
     }
 
-    #[test]
-    fn the_cpu_does_what_the_device_declines() {
-        let config = Config { backend: Backend::Device, ..Config::DEFAULT };
-        let device = Box::new(RemoteDevice { find_all: |_, _| None });
-        let mut broad_phase = BroadPhase::with_device(config, device).unwrap();
-        (0..40).for_each(|id| change(&mut broad_phase, id, 7 * id + 1));
-        let events = broad_phase.update().unwrap().added.len();
-        assert!(
-            events > 20
-                && broad_phase.pairs().eq(oracle::pairs_filtered(
-                    broad_phase.fat_aabbs(),
-                    &(0..40)
-                        .map(|id| ProxyFilter { body: (7 * id + 1) % 13, ..ProxyFilter::ALL })
-                        .collect::<Vec<_>>(),
-                )),
-            "{events} events"
-        );
-        assert!(broad_phase.report().fallback.as_deref().is_some_and(|why| why.contains("declined")));
-    }
-
     /// Sets, moves, filters anew or removes a box, as a number says.
     fn change(broad_phase: &mut BroadPhase, id: u32, number: u32) {
         if number.is_multiple_of(5) {

@@ -15,8 +15,6 @@ pub enum Choice {
     Cpu,
     /// Pbig on a GPU; without one the CPU does the work and the figures say so.
     Gpu,
-    /// Pbig, which tests every pair.
-    Brute,
 }
 
 impl Choice {
@@ -27,7 +25,6 @@ impl Choice {
             Self::Auto => "pbig",
             Self::Cpu => "pbig on the CPU",
             Self::Gpu => "pbig on the GPU",
-            Self::Brute => "pbig, every pair tested",
         }
     }
 
@@ -35,7 +32,7 @@ impl Choice {
     pub const fn next(self) -> Self {
         match self {
             Self::Stock => Self::Cpu,
-            Self::Auto | Self::Cpu | Self::Brute => Self::Gpu,
+            Self::Auto | Self::Cpu => Self::Gpu,
             Self::Gpu => Self::Stock,
         }
     }
@@ -47,7 +44,6 @@ impl Choice {
             Self::Auto => Backend::Auto,
             Self::Cpu => Backend::Cpu,
             Self::Gpu => Backend::Device,
-            Self::Brute => Backend::Brute,
         };
         let config = PbigConfig { backend, ..PbigConfig::DEFAULT };
         let mut pbig = PbigBroadPhase::with_config(config).expect("the default margin is a length");

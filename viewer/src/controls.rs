@@ -126,25 +126,4 @@ mod tests {
         }
         assert_eq!(action_of(Key::F12), None);
     }
-
-    #[test]
-    fn a_step_pauses_and_makes_one_step() {
-        let (mut controls, mut simulation) = start();
-        controls.obey(Action::Step, &mut simulation, BALL);
-        assert!(controls.is_paused && simulation.steps == 1);
-        controls.obey(Action::Step, &mut simulation, BALL);
-        controls.obey(Action::Pause, &mut simulation, BALL);
-        assert!(!controls.is_paused && simulation.steps == 2);
-    }
-
-    #[test]
-    fn every_colouring_comes_in_turn() {
-        let (mut controls, mut simulation) = start();
-        let mut seen = Vec::new();
-        while !seen.contains(&controls.colouring) {
-            seen.push(controls.colouring);
-            controls.obey(Action::NextColouring, &mut simulation, BALL);
-        }
-        assert_eq!(seen, Colouring::ALL);
-    }
 }

@@ -13,7 +13,7 @@ const FAINT: Rgba = [0.13, 0.16, 0.20, 0.22];
 pub fn colour_of(choice: Choice) -> Rgba {
     rgba(match choice {
         Choice::Stock => 0xd94724,
-        Choice::Auto | Choice::Cpu | Choice::Brute => 0x0a8075,
+        Choice::Auto | Choice::Cpu => 0x0a8075,
         Choice::Gpu => 0x6b42cc,
     })
 }

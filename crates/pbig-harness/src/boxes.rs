@@ -2,7 +2,6 @@
 
 use pbig_core::Aabb;
 use rand::rngs::StdRng;
-use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 
@@ -42,109 +41,6 @@ pub fn moved(boxes: &[Aabb], distance: f32, seed: u64) -> Vec<Aabb> {
     let mut rng = StdRng::seed_from_u64(seed);
     let mut shift = |b: &Aabb| shifted(b, [0; 3].map(|_| rng.random_range(-distance..=distance)));
     boxes.iter().map(&mut shift).collect()
-}
-
-/// Cubes whose edges differ by up to `spread` times (log-uniform around 1), about `pairs` pairs a box:
-/// with `spread` 1 the set `unit` at other densities.
-pub fn cubes(n: usize, spread: f32, pairs: f32, seed: u64) -> Vec<Aabb> {
-    let mut rng = StdRng::seed_from_u64(seed);
-    let edges: Vec<f32> = (0..n).map(|_| spread.powf(rng.random_range(-0.5..=0.5))).collect();
-    // Two cubes overlap when their centres are closer than half the sum of edges on each axis, so their
-    // chance in a space V is (e + f)^3 / V; edges in turn stand for random ones.
-    let cubed = |two: &[f32]| f64::from(two[0] + two[two.len() - 1]).powi(3);
-    let mean = edges.windows(2).map(cubed).sum::<f64>() / edges.len().max(2) as f64;
-    let side = (mean * n as f64 / (2.0 * f64::from(pairs))).cbrt() as f32;
-    let mut edges = edges.into_iter();
-    with(n, || {
-        let half = edges.next().map_or(0.5, |edge| edge / 2.0);
-        ([0; 3].map(|_| rng.random_range(0.0..side.max(1.0))), [half; 3])
-    })
-}
-
-/// The boxes that move in each frame: a share of all, each frame a different one.
-#[derive(Clone, Debug)]
-pub struct Movers {
-    order: Vec<u32>,
-    pub count: usize,
-}
-
-impl Movers {
-    /// A share of `n`, rounded, at least one.
-    pub fn new(n: usize, share: f64) -> Self {
-        let mut order: Vec<u32> = (0..n as u32).collect();
-        order.shuffle(&mut StdRng::seed_from_u64(7));
-        Self { order, count: ((n as f64 * share).round() as usize).clamp(n.min(1), n) }
-    }
-
-    /// Returns the boxes that move in a frame, in ascending order.
-    pub fn of(&self, frame: usize) -> Vec<u32> {
-        let n = self.order.len();
-        let mut movers: Vec<u32> =
-            (0..self.count).map(|i| self.order[(frame * self.count + i) % n]).collect();
-        movers.sort_unstable();
-        movers
-    }
-}
-
-/// Boxes that go to and fro: a mover at home goes up to a distance away along each axis, one that is away
-/// returns. So a set stays what it is, however many frames there are.
-#[derive(Clone, Debug)]
-pub struct Wander {
-    pub boxes: Vec<Aabb>,
-    home: Vec<Aabb>,
-    is_away: Vec<bool>,
-    movers: Movers,
-    distance: f32,
-    /// The displacement of each box per frame, for boxes that do not return.
-    velocities: Vec<[f32; 3]>,
-}
-
-impl Wander {
-    /// All at home; a share of them will move in each frame.
-    pub fn new(boxes: Vec<Aabb>, share: f64, distance: f32) -> Self {
-        let movers = Movers::new(boxes.len(), share);
-        let (home, is_away) = (boxes.clone(), vec![false; boxes.len()]);
-        Self { home, is_away, boxes, movers, distance, velocities: vec![] }
-    }
-
-    /// All move in every frame, each in a direction of its own by up to the distance along each axis; at the border of
-    /// the space of the set they turn.
-    pub fn drifting(boxes: Vec<Aabb>, distance: f32) -> Self {
-        let mut rng = StdRng::seed_from_u64(9);
-        let velocities =
-            boxes.iter().map(|_| [0; 3].map(|_| rng.random_range(-distance..=distance))).collect();
-        Self { velocities, ..Self::new(boxes, 1.0, distance) }
-    }
-
-    /// Moves those of a frame, and tells who they are.
-    pub fn step(&mut self, frame: usize) -> Vec<u32> {
-        let movers = self.movers.of(frame);
-        if !self.velocities.is_empty() {
-            self.drift();
-            return movers;
-        }
-        let homes: Vec<Aabb> = movers.iter().map(|&id| self.home[id as usize]).collect();
-        for (&id, place) in movers.iter().zip(moved(&homes, self.distance, frame as u64)) {
-            let i = id as usize;
-            self.boxes[i] = if self.is_away[i] { self.home[i] } else { place };
-            self.is_away[i] = !self.is_away[i];
-        }
-        movers
-    }
-
-    fn drift(&mut self) {
-        let space = self.home.iter().fold(Aabb::NOWHERE, |space, home| space.union(home));
-        for (aabb, velocity) in self.boxes.iter_mut().zip(&mut self.velocities) {
-            for (k, v) in velocity.iter_mut().enumerate() {
-                let (out, below) = (aabb.max[k] > space.max[k], aabb.min[k] < space.min[k]);
-                if (out && *v > 0.0) || (below && *v < 0.0) {
-                    *v = -*v;
-                }
-                aabb.min[k] += *v;
-                aabb.max[k] += *v;
-            }
-        }
-    }
 }
 
 fn with(n: usize, make: impl FnMut() -> ([f32; 3], [f32; 3])) -> Vec<Aabb> {
@@ -236,38 +132,5 @@ mod tests {
             assert_eq!(bits(1), bits(1), "{}", set.name);
             assert_ne!(bits(1), bits(2), "{}", set.name);
         }
-    }
-
-    #[test]
-    fn cubes_have_about_the_pairs_that_were_asked_for() {
-        for (spread, pairs) in [(1.0, 1.0), (1.0, 4.0), (30.0, 1.0)] {
-            let found = pbig_core::oracle::pairs(&cubes(3000, spread, pairs, 1)).len() as f32 / 3000.0;
-            assert!((0.6 * pairs..1.4 * pairs).contains(&found), "{spread} {pairs}: {found}");
-        }
-    }
-
-    #[test]
-    fn wanderers_return_and_drifters_go_on_and_turn_at_the_border() {
-        let start = BoxSet::ALL[2].boxes(200, 1);
-        let mut wander = Wander::new(start.clone(), 1.0, 0.1);
-        assert_eq!(wander.step(0).len(), 200);
-        assert!(wander.boxes.iter().zip(&start).all(|(now, home)| now != home));
-        wander.step(1);
-        assert_eq!(wander.boxes, start);
-        let mut drifting = Wander::drifting(start.clone(), 0.1);
-        (0..400).for_each(|frame| assert_eq!(drifting.step(frame).len(), 200));
-        let gone = drifting.boxes.iter().zip(&start).map(|(a, b)| (a.min[0] - b.min[0]).abs()).sum::<f32>();
-        assert!(gone > 200.0, "{gone}: more than an edge each");
-        let edge = 800f32.cbrt() + 2.0;
-        assert!(drifting.boxes.iter().all(|aabb| aabb.min[0] > -1.0 && aabb.max[0] < edge));
-    }
-
-    #[test]
-    fn movers_are_a_share_and_others_each_time() {
-        let movers = Movers::new(100, 0.1);
-        let mut all: Vec<u32> = (0..10).flat_map(|frame| movers.of(frame)).collect();
-        all.sort_unstable();
-        assert_eq!(all, (0..100).collect::<Vec<_>>());
-        assert_eq!((Movers::new(5, 0.01).count, Movers::new(5, 1.0).count), (1, 5));
     }
 }

@@ -11,13 +11,9 @@ pub mod checks;
 pub mod corpus;
 #[cfg(feature = "run")]
 pub mod counting;
-#[cfg(feature = "run")]
-pub mod field;
 #[cfg(feature = "files")]
 pub mod files;
 pub mod follower;
-#[cfg(feature = "run")]
-pub mod gpu_race;
 pub mod hard;
 #[cfg(feature = "files")]
 pub mod mesh;

@@ -2,6 +2,7 @@
 //! which one instanced call draws.
 
 use crate::world::World;
+use rapier3d::na::Matrix4;
 use rapier3d::parry::shape::{Shape, TypedShape};
 use rapier3d::prelude::*;
 
@@ -41,6 +42,13 @@ pub struct Part {
     pub local: Isometry<Real>,
     /// Its half extents, if its kind fits into the cube.
     pub scale: Vector<Real>,
+}
+
+impl Part {
+    /// Returns the matrix that scales the shape, and places it where its collider is.
+    pub fn matrix(&self, collider: &Collider) -> Matrix4<Real> {
+        (collider.position() * self.local).to_homogeneous().prepend_nonuniform_scaling(&self.scale)
+    }
 }
 
 /// Vertices in the frame of a shape, and the three vertices of each triangle.
@@ -189,6 +197,13 @@ mod tests {
             let distance = (drawn.mins - wanted.mins).norm() + (drawn.maxs - wanted.maxs).norm();
             assert!(distance < 1e-5, "{:?}: {drawn:?} is not {wanted:?}", shape.shape_type());
         }
+    }
+
+    #[test]
+    fn a_matrix_scales_then_places() {
+        let cuboid = ColliderBuilder::cuboid(1.0, 2.0, 3.0).translation(vector![4.0, 5.0, 6.0]).build();
+        let wanted = [1., 0., 0., 0., 0., 2., 0., 0., 0., 0., 3., 0., 4., 5., 6., 1.];
+        assert_eq!(parts_of(&cuboid.shared_shape().clone())[0].matrix(&cuboid).as_slice(), wanted);
     }
 
     fn aabb(part: &Part) -> Aabb {

@@ -22,7 +22,7 @@ pub(super) enum Way {
 }
 
 /// The settings of [`Way::Gpu`].
-const ON_GPU: Config = Config { backend: Backend::Device, ..UNSORTED };
+pub(super) const ON_GPU: Config = Config { backend: Backend::Device, ..UNSORTED };
 
 /// One call and its results.
 #[derive(Clone, Default)]

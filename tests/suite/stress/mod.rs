@@ -4,7 +4,6 @@
 mod extremes;
 mod fuzzed;
 mod motion;
-mod multitudes;
 mod shapes;
 mod soak;
 

@@ -21,30 +21,6 @@ fn the_same_setting_gives_the_same_world_after_a_reset() {
 }
 
 #[test]
-fn every_scene_comes_in_turn() {
-    let mut simulation = column(Choice::Cpu);
-    let first = simulation.setting.scene.name;
-    for _ in Scene::ALL {
-        simulation.setting = simulation.setting.next_scene();
-    }
-    assert_eq!(simulation.setting.scene.name, first);
-    simulation.next_scene();
-    assert!(simulation.setting.scene.name != first && simulation.steps == 0);
-}
-
-#[test]
-fn a_thrown_ball_flies() {
-    let mut simulation = column(Choice::Cpu);
-    let before = simulation.world.bodies.len();
-    simulation.throw(Ball { from: [-50.0, 3.0, 0.0], velocity: [60.0, 0.0, 0.0], radius: 1.0 });
-    assert_eq!(simulation.world.bodies.len(), before + 1);
-    simulation.step();
-    let farthest =
-        simulation.world.bodies.iter().map(|(_, body)| body.translation().x).fold(f32::MAX, f32::min);
-    assert!((farthest + 49.0).abs() < 0.01, "{farthest}");
-}
-
-#[test]
 fn figures_after_a_swap_are_of_the_new_broad_phase_alone() {
     let mut simulation = column(Choice::Stock);
     for (i, choice) in [Choice::Cpu, Choice::Stock, Choice::Cpu].into_iter().enumerate() {

@@ -1,8 +1,7 @@
 //! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel.
 
-use pbig_core::{Aabb, Backend, Config, DeviceReport, Finder, Limits};
+use pbig_core::{Aabb, Backend, Config, DeviceReport, Finder, Limits, Report};
 use pbig_gpu::{DECLINED, GpuFinder, GpuOptions};
-use pbig_harness::gpu_race::{on_device, race};
 use pbig_harness::prelude::*;
 
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, ..Config::DEFAULT };
@@ -11,8 +10,7 @@ const ON_GPU: Config = Config { backend: Backend::Device, ..CONFIG };
 pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
     let head = vec![("adapter", gpu.adapter().to_owned()), ("software", gpu.is_software().to_string())];
-    let [searches, kernels] = searches(&gpu, quick)?;
-    let tables = vec![searches, kernels, events(&gpu, quick)?];
+    let tables = searches(&gpu, quick)?.into();
     Ok(BenchReport { head, ..BenchReport::new("gpu", tables) })
 }
 
@@ -108,23 +106,8 @@ fn time(finder: &mut Finder, boxes: &[Aabb]) -> Result<f64, Failure> {
     Ok(found.map(|()| ms)?)
 }
 
-/// Returns the medians of setting the boxes of the set `unit` that have moved by up to a tenth of an edge, and the update. A device
-/// searches all boxes, whatever the share. A row has no times, and standard error says why, if the device leaves an update to the CPU.
-fn events(gpu: &GpuFinder, quick: bool) -> Result<Table, Failure> {
-    let mut table = Table::new("events", "boxes | share | pairs | events | cpu_ms | gpu_ms | cpu_over_gpu");
-    let sizes = sizes(gpu, quick).into_iter().filter(|n| *n >= 10_000);
-    let cases = sizes.flat_map(|n| [0.01, 0.1, 1.0].map(|share| (n, share)));
-    for (n, share) in tracked(cases, "shares") {
-        let raced = match race(gpu, boxes("unit", n), share, 0.1) {
-            Err(Failure::Check(why)) if why.starts_with(DECLINED) => {
-                eprintln!("unit, {n} boxes: {why}");
-                table.row(cells![n, share]);
-                continue;
-            }
-            raced => raced?,
-        };
-        let [cpu, gpu] = raced.ms;
-        table.row(cells![n, share, raced.pairs, raced.events, cpu, gpu, cpu / gpu]);
-    }
-    Ok(table)
+/// Returns the report of the device. If the device left the call to the CPU, this is an error.
+fn on_device(report: &Report) -> Result<&DeviceReport, Failure> {
+    let why = || Failure::Check(report.fallback.clone().unwrap_or_else(|| "the CPU did the work".into()));
+    report.device.as_ref().ok_or_else(why)
 }

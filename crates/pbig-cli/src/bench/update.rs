@@ -1,22 +1,22 @@
 //! `pbig bench update`: a broad phase's call through rapier, ours and stock's in turn on the same world.
 
 use super::memory;
-use pbig_core::Aabb;
-use pbig_harness::field::Field;
+use pbig_harness::motions::{Density, Motion, MovingBoxes};
 use pbig_harness::prelude::*;
+use pbig_harness::world::World;
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
-
-/// The distance that boxes of these sets, with edges of 1 to 100, move in a frame: far beyond any margin.
-const DISTANCE: f32 = 1.0;
 
 /// Calls in which nothing has moved are measured together: one is shorter than a clock can tell.
 const STILL_CALLS: usize = 1000;
 
-/// Pbig's and rapier's own broad phase beside the same world.
+/// Boxes as cuboids of a rapier world, which are moved by hand, beside pbig's and rapier's own broad phase.
 struct Calls {
-    field: Field,
-    movers: Option<Movers>,
+    boxes: MovingBoxes,
+    is_still: bool,
+    world: World,
+    /// By box.
+    bodies: Vec<RigidBodyHandle>,
     modified: Vec<ColliderHandle>,
     ours: PbigBroadPhase,
     stock: DefaultBroadPhase,
@@ -27,17 +27,24 @@ const OURS: usize = 0;
 const STOCK: usize = 1;
 
 impl Calls {
-    /// A world with two broad phases that know it. Without movers nothing moves.
-    fn new(boxes: &[Aabb], share: Option<f64>) -> Self {
+    /// A world with two broad phases that know it. Without a motion nothing moves.
+    fn new(motion: Option<Motion>, density: Density, n: usize) -> Self {
         let mut calls = Self {
-            field: Field::new(boxes),
-            movers: share.map(|share| Movers::new(boxes.len(), share)),
+            boxes: MovingBoxes::new(motion.unwrap_or(Motion::Few), density, n, 1),
+            is_still: motion.is_none(),
+            world: World::default(),
+            bodies: vec![],
             modified: vec![],
             ours: PbigBroadPhase::new(),
             stock: DefaultBroadPhase::new(),
             events: vec![],
         };
-        calls.modified.clone_from(&calls.field.colliders);
+        for aabb in calls.boxes.boxes() {
+            let [x, y, z] = aabb.extents().map(|edge| 0.5 * edge);
+            let body = RigidBodyBuilder::dynamic().translation(centre(aabb));
+            calls.bodies.push(calls.world.add(body, ColliderBuilder::cuboid(x, y, z)));
+        }
+        calls.modified = calls.world.colliders.iter().map(|(handle, _)| handle).collect();
         calls.update(OURS);
         calls.update(STOCK);
         calls.modified.clear();
@@ -46,58 +53,52 @@ impl Calls {
 
     fn update(&mut self, side: usize) {
         let broad_phase: &mut dyn BroadPhase = if side == OURS { &mut self.ours } else { &mut self.stock };
+        let World { params, colliders, bodies, .. } = &self.world;
         self.events.clear();
-        self.field.call(broad_phase, &self.modified, &mut self.events);
+        broad_phase.update(params, colliders, bodies, &self.modified, &[], &mut self.events);
     }
 
-    fn prepare(&mut self, round: usize) {
-        if let Some(movers) = &self.movers {
-            self.modified = self.field.shift(&movers.of(round), DISTANCE);
+    /// Moves boxes, and lists their colliders as a step does.
+    fn prepare(&mut self, _: usize) {
+        if self.is_still {
+            return;
         }
+        self.modified.clear();
+        let World { colliders, bodies, .. } = &mut self.world;
+        for id in self.boxes.step().to_vec() {
+            let body = &mut bodies[self.bodies[id as usize]];
+            body.set_translation(centre(&self.boxes.boxes()[id as usize]), false);
+            self.modified.push(body.colliders()[0]);
+        }
+        bodies.propagate_modified_body_positions_to_colliders(colliders);
     }
 
     fn run(&mut self, side: usize) -> Result<f64, Failure> {
-        let calls = if self.movers.is_none() { STILL_CALLS } else { 1 };
-        let ((), time) = timed(|| {
-            for _ in 0..calls {
-                self.update(side);
-            }
-        });
+        let calls = if self.is_still { STILL_CALLS } else { 1 };
+        let ((), time) = timed(|| (0..calls).for_each(|_| self.update(side)));
         Ok(time / calls as f64)
     }
 }
 
-/// A set of boxes, and the share that moves; none: nothing moves.
-type UpdateCase = (&'static str, usize, Option<f64>);
-
-fn cases(quick: bool) -> impl Iterator<Item = UpdateCase> {
-    let of = |share| [1000, 10_000, 100_000, 1_000_000].map(|boxes| ("uniform", boxes, share));
-    let others = [("gaussian", 10_000, Some(1.0)), ("gaussian", 100_000, Some(1.0))];
-    let all = of(Some(1.0)).into_iter().chain(others).chain(of(Some(0.01))).chain(of(None));
-    all.filter(move |(_, boxes, _)| !quick || *boxes <= 10_000)
+fn centre(aabb: &pbig_core::Aabb) -> Vector<Real> {
+    Vector::from_fn(|k, _| 0.5 * (aabb.min[k] + aabb.max[k]))
 }
+
+/// Motions with their names; none: nothing moves.
+const MOTIONS: [(&str, Option<Motion>); 3] =
+    [("all", Some(Motion::Swing)), ("1%", Some(Motion::Few)), ("nothing", None)];
 
 pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let mut table = Table::new("update", COMPARED);
-    for case in tracked(cases(quick), "cases") {
-        measure(case, Effort::new(quick), &mut table)?;
+    let sizes: &[usize] = if quick { &[1000, 10_000] } else { &[1000, 10_000, 100_000, 1_000_000] };
+    let cases = MOTIONS.iter().flat_map(|motion| sizes.iter().map(move |n| (*motion, *n)));
+    for ((name, motion), n) in tracked(cases, "cases") {
+        let mut calls = Calls::new(motion, Density::Sparse, n);
+        let times = measured(&mut calls, 2, Effort::new(quick), Calls::prepare, Calls::run)?;
+        let (case, pairs) = (format!("unit, {name} moved"), calls.ours.pair_count() as u64);
+        let unit = if calls.is_still { ("us", 1e3) } else { MS };
+        table.row(compared(&case, n, pairs, unit, times[OURS], ("stock", times[STOCK])));
     }
     memory::peaks(quick, &mut table)?;
     Ok(BenchReport::new("update", vec![table]))
-}
-
-/// Appends the row of a case.
-fn measure((set, n, share): UpdateCase, effort: Effort, table: &mut Table) -> Result<(), Failure> {
-    let boxes = BoxSet::named(set).expect("a set of the harness").boxes(n, 1);
-    let mut calls = Calls::new(&boxes, share);
-    let times = measured(&mut calls, 2, effort, Calls::prepare, Calls::run)?;
-    let moved = match share {
-        None => "nothing".into(),
-        Some(1.0) => "all".into(),
-        Some(share) => format!("{}%", share * 100.0),
-    };
-    let (case, pairs) = (format!("{set}, {moved} moved"), calls.ours.pair_count() as u64);
-    let unit = if share.is_none() { ("us", 1e3) } else { MS };
-    table.row(compared(&case, n, pairs, unit, times[OURS], ("stock", times[STOCK])));
-    Ok(())
 }

@@ -65,12 +65,6 @@ fn bench_gpu_has_both_backends() {
     let tables = tables("gpu");
     let searches = rows(&tables, "searches");
     assert!(searches.len() == 6 && searches.iter().all(|row| number(row, "cpu_over_gpu") > 0.0));
-    let events = rows(&tables, "events");
-    assert_eq!(events.len(), 3);
-    for row in events {
-        assert!(number(row, "cpu_ms") > 0.0 && number(row, "gpu_ms") > 0.0, "{row}");
-    }
-    assert!(number(&events[2], "events") > 1000.0);
 }
 
 #[test]

@@ -1,13 +1,10 @@
 //! Prints frames of rapier 0.36.1 with its own broad phase and with pbig, in turn, as CSV: `cargo run --release --bin bench_step -- --help`.
 
 use clap::Parser;
-use pbig_chart::{Chart, Line, Plot};
 use pbig_harness_036::run::{Run, StepTime, Summary};
 use pbig_scenes::frames::FrameKind;
 use pbig_scenes::scenes::Scene;
 use rapier::prelude::BroadPhaseBvh;
-use std::path::PathBuf;
-use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 /// Frames of rapier 0.36.1, with its own broad phase ("stock") and with pbig, in turn: a whole step, and scene queries, as CSV.
@@ -28,9 +25,6 @@ struct Args {
     /// Seconds for each row after the first step, which is not counted.
     #[arg(long, default_value_t = 60)]
     seconds: u64,
-    /// File for a chart of each step of the last row (SVG).
-    #[arg(long)]
-    chart: Option<PathBuf>,
 }
 
 /// The heading of the rows. With fewer than 100 steps p99 is the worst step.
@@ -43,40 +37,13 @@ stock_queries_mean_ms,pbig_queries_mean_ms,stock_over_pbig_frame_mean,stock_hits
 /// The threads that rapier uses.
 const THREADS: &str = if cfg!(feature = "parallel") { "2" } else { "1" };
 
-fn main() -> ExitCode {
+fn main() {
     let mut args = Args::parse();
     if args.scenes.is_empty() {
         args.scenes = Scene::ALL.to_vec();
     }
-    match run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("{error}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-fn run(args: &Args) -> Result<(), String> {
     println!("{HEADING}");
-    for case in cases(args) {
-        let runs = case.measure(args);
-        println!("{}", case.row(&runs.each_ref().map(Side::of)));
-        if let Some(file) = &args.chart {
-            chart(&runs).write(file)?;
-        }
-    }
-    Ok(())
-}
-
-/// Returns the times of each step of stock and pbig.
-fn chart(runs: &[Run; 2]) -> Chart {
-    let plot = |title, of: fn(&StepTime) -> f64| {
-        let lines = ["stock", "pbig"].into_iter().zip(runs);
-        Plot::steps(title, lines.map(|(name, run)| Line::steps(name, run.times.iter().map(of))).collect())
-    };
-    let plots = vec![plot("broad phase", |time| time.broad_phase), plot("whole step", |time| time.step)];
-    Chart { plots, ..Chart::default() }
+    cases(&args).for_each(|case| println!("{}", case.row(&case.measure(&args))));
 }
 
 fn cases(args: &Args) -> impl Iterator<Item = Case> {
@@ -122,7 +89,7 @@ impl Side {
 
 impl Case {
     /// Runs stock and pbig.
-    fn measure(&self, args: &Args) -> [Run; 2] {
+    fn measure(&self, args: &Args) -> [Side; 2] {
         let [mut stock, mut ours] = [BroadPhaseBvh::new(), rapier_pbig::broad_phase()]
             .map(|one| Run::new(self.scene, self.bodies, 1, one).with_queries(self.queries));
         stock.step();
@@ -138,7 +105,7 @@ impl Case {
                 break;
             }
         }
-        [stock, ours]
+        [&stock, &ours].map(Side::of)
     }
 
     /// Returns a row, see [`HEADING`].

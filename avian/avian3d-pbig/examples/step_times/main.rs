@@ -4,8 +4,8 @@
 //! cargo run --release --example step_times -- column 10000 200
 //! ```
 
+// `compare.rs` here is a link to the example.
 #[allow(dead_code, reason = "compare also prints a table and compares contacts")]
-#[path = "compare.rs"]
 mod compare;
 
 use avian::prelude::*;

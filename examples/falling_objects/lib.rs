@@ -1,1 +1,0 @@
-//! The package of one example, `main.rs`. Cargo asks for a library beside it.
