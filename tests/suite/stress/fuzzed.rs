@@ -7,10 +7,12 @@ use rand::{RngExt, SeedableRng};
 
 type Check = fn(&[u8]);
 
-const TARGETS: [(&str, Check); 7] = [
+const TARGETS: [(&str, Check); 9] = [
     ("finder_against_oracle", checks::finder_against_oracle),
+    ("between_against_oracle", checks::between_against_oracle),
     ("updates_against_scratch", checks::updates_against_scratch),
-    ("pairs_and_snapshots", checks::pairs_and_snapshots),
+    ("work_is_bounded", checks::work_is_bounded),
+    ("decode", checks::decode_words),
     ("npy_reader", checks::npy_reader),
     ("csv_reader", checks::csv_reader),
     ("ply_reader", checks::ply_reader),
@@ -54,7 +56,10 @@ fn random_bytes_on_every_target() {
             let bytes: Vec<u8> = (0..length).map(|_| rng.random_range(0..kinds) as u8).collect();
             largest();
             check(&bytes);
-            assert_fits(largest(), &bytes);
+            // A recipe is a world of two thousand boxes, however short.
+            if target != "work_is_bounded" {
+                assert_fits(largest(), &bytes);
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 use pbig_core::{Aabb, BroadPhase, Pair, PairList, ProxyFilter};
 
 /// A byte that chooses, and one for the number of boxes; then pairs, or a snapshot.
-pub fn pairs_and_snapshots(data: &[u8]) {
+pub fn decode_words(data: &[u8]) {
     let [format, boxes, rest @ ..] = data else { return };
     if format & 3 == 3 {
         return snapshot(rest);
