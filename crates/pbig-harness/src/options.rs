@@ -20,6 +20,10 @@ pub enum BackendOption {
 }
 
 impl BackendOption {
+    pub fn for_rapier(self) -> PbigBroadPhase {
+        self.for_rapier_on(shared_gpu(self.backend(), GpuOptions::DEFAULT))
+    }
+
     /// Returns a broad phase for rapier, on a device if there is one.
     pub fn for_rapier_on(self, device: Option<Box<dyn PairDevice>>) -> PbigBroadPhase {
         let config = PbigConfig { backend: self.backend(), ..PbigConfig::DEFAULT };
