@@ -42,7 +42,11 @@ fn rigid_body(body: &Body) -> RigidBodyBuilder {
 }
 
 fn collider(part: &Collider) -> ColliderBuilder {
-    let mut built = ColliderBuilder::new(shape(&part.shape)).position(pose(part.at)).sensor(part.is_sensor);
+    let mut built =
+        ColliderBuilder::new(shape(&part.shape)).position(turned(part.at, part.turn)).sensor(part.is_sensor);
+    if let Some(friction) = part.friction {
+        built = built.friction(friction);
+    }
     if let Some(restitution) = part.restitution {
         built = built.restitution(restitution);
     }

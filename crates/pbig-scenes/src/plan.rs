@@ -93,6 +93,8 @@ pub struct Collider {
     pub shape: Shape,
     pub body: Option<usize>,
     pub at: Vec3,
+    pub turn: Quat,
+    pub friction: Option<f32>,
     pub restitution: Option<f32>,
     pub is_sensor: bool,
     /// Pairs of fixed colliders count, too.
@@ -126,6 +128,10 @@ impl Collider {
 
     pub fn at(self, at: Vec3) -> Self {
         Self { at, ..self }
+    }
+
+    pub fn friction(self, friction: f32) -> Self {
+        Self { friction: Some(friction), ..self }
     }
 
     pub fn restitution(self, restitution: f32) -> Self {

@@ -85,6 +85,20 @@ fn nothing_explodes_or_falls_through_the_ground_in_300_steps() {
 }
 
 #[test]
+fn a_conveyor_never_runs_dry() {
+    let mut run = Run::new("conveyor", 140);
+    for steps in [60, 140, 200, 500] {
+        run = run.steps(steps);
+        let gates = run.world.narrow_phase.intersection_pairs().filter(|(_, _, is_inside)| *is_inside);
+        let gates = gates.count();
+        assert!(gates > 15, "{gates} crates in gates");
+        let moved =
+            run.dynamic().iter().filter(|(start, now)| now.y > 1.2 && start.distance(*now) > 0.3).count();
+        assert!(moved > 35, "{moved} of 40 crates are carried");
+    }
+}
+
+#[test]
 fn most_drops_of_rain_land_on_the_hills() {
     let run = Run::new("rain", 1000).steps(STEPS);
     let is_on_hills = |at: &Vec3| at.x.abs().max(at.z.abs()) < 1000_f32.sqrt() * 1.5;
@@ -93,6 +107,15 @@ fn most_drops_of_rain_land_on_the_hills() {
     let through = landed.iter().filter(|height| **height < 0.2).count();
     assert!(landed.len() > 700, "{} drops are on the hills", landed.len());
     assert!(through * 50 < landed.len(), "{through} of {} drops fell through the hills", landed.len());
+}
+
+#[test]
+fn a_jar_holds_what_falls_into_it() {
+    let run = Run::new("jar", 500).steps(STEPS);
+    let widest = run.start.iter().fold(0.0, |most: f32, at| most.max(Vec3::new(at.x, 0.0, at.z).length()));
+    for (start, now) in run.dynamic() {
+        assert!(Vec3::new(now.x, 0.0, now.z).length() < widest + 0.7 && now.y > 0.0, "{start} {now}");
+    }
 }
 
 #[test]

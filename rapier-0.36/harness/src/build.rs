@@ -37,7 +37,11 @@ fn rigid_body(body: &Body) -> RigidBodyBuilder {
 }
 
 fn collider(part: &Collider) -> ColliderBuilder {
-    let mut built = ColliderBuilder::new(shape(&part.shape)).position(pose(part.at)).sensor(part.is_sensor);
+    let pose = turned(part.at, part.turn);
+    let mut built = ColliderBuilder::new(shape(&part.shape)).position(pose).sensor(part.is_sensor);
+    if let Some(friction) = part.friction {
+        built = built.friction(real(friction));
+    }
     if let Some(restitution) = part.restitution {
         built = built.restitution(real(restitution));
     }

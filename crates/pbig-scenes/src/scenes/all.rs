@@ -1,6 +1,6 @@
 //! The list of scenes.
 
-use super::{Scene, asteroids, falling, filtered, ragdolls, resting};
+use super::{Scene, asteroids, conveyor, falling, filtered, jar, ragdolls, resting};
 
 /// Makes the list of rows: name, default number of bodies, builder; a description; what is hard.
 macro_rules! scenes {
@@ -11,7 +11,7 @@ macro_rules! scenes {
 
 impl Scene {
     /// Every scene.
-    pub const ALL: [Self; 16] = scenes! {
+    pub const ALL: [Self; 18] = scenes! {
         "column" 1000 falling::column,
             "spheres, cubes and slabs fall in a column onto a plane (Avril, figure 1)",
             "all boxes move at first, then rest in a heap";
@@ -36,6 +36,9 @@ impl Scene {
         "mixed" 600 falling::mixed,
             "sizes from 0.05 to 50 fall together",
             "large boxes beside small ones";
+        "jar" 1500 jar::jar,
+            "balls and cubes of mixed sizes fall into a jar",
+            "small boxes crowded between larger ones";
         "city" 3000 resting::city,
             "fixed blocks in streets, few movers among them",
             "many boxes of which few move";
@@ -48,6 +51,9 @@ impl Scene {
         "ragdolls" 660 ragdolls::ragdolls,
             "figures of eleven jointed parts fall over each other",
             "small boxes that overlap by their joints, and are no contacts";
+        "conveyor" 1400 conveyor::conveyor,
+            "rollers carry crates around in rings, through gates, which are sensors",
+            "sensors that boxes enter and leave all the time";
         "sensors" 800 filtered::sensors,
             "spheres fall through layers of sensors, some that see fixed bodies too",
             "pairs of sensors and of fixed boxes";

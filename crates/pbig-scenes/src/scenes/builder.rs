@@ -72,6 +72,16 @@ impl Builder {
     pub(super) fn fixed(&mut self, at: Vec3, collider: Collider) {
         self.insert(collider.at(at));
     }
+
+    /// Adds a collider without a body, turned around the vertical axis by an angle in radians.
+    pub(super) fn fixed_turned(&mut self, at: Vec3, angle: f32, collider: Collider) {
+        self.insert(Collider { turn: Quat::from_rotation_y(angle), ..collider.at(at) });
+    }
+
+    /// Adds a box without a body, turned around the vertical axis by an angle in radians.
+    pub(super) fn fixed_cuboid(&mut self, at: Vec3, half: Vec3, angle: f32) {
+        self.fixed_turned(at, angle, Collider::cuboid(half.x, half.y, half.z));
+    }
 }
 
 /// Returns the `i`-th place of a square column, layer by layer from the ground.

@@ -5,8 +5,10 @@
 mod all;
 mod asteroids;
 mod builder;
+mod conveyor;
 mod falling;
 mod filtered;
+mod jar;
 mod ragdolls;
 mod resting;
 
@@ -36,7 +38,7 @@ impl Scene {
     }
 
     /// Returns the world with `bodies` dynamic and kinematic bodies. Figures of `ragdolls` are whole, so the last may be too
-    /// many, and `groups` adds two walls. Houses of `city` and sensors of `sensors` count as bodies.
+    /// many, and `groups` adds two walls. Houses of `city` and sensors of `conveyor` and `sensors` count as bodies.
     pub fn plan(&self, bodies: usize, seed: u64) -> Plan {
         let mut builder = Builder { plan: Plan::default(), rng: StdRng::seed_from_u64(seed) };
         (self.build)(&mut builder, bodies);
@@ -59,7 +61,7 @@ mod tests {
     fn bodies_of(name: &str, world: &World) -> usize {
         let counts = |collider: &Collider| match name {
             "city" => collider.shape().as_cuboid().is_some(),
-            "sensors" => collider.is_sensor(),
+            "conveyor" | "sensors" => collider.is_sensor(),
             _ => false,
         };
         let fixed =
