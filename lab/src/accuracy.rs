@@ -1,5 +1,7 @@
 //! Run time against error of the way from the index of a pair to the pair (Avril 3.2 and 3.3): every root, every correction.
 
+mod paper;
+
 use crate::index::*;
 use pbig_harness::chart::{Chart, Line};
 use pbig_harness::prelude::*;
@@ -17,7 +19,7 @@ pub fn run(quick: bool) -> Result<BenchReport, Failure> {
     let axes = ["time, ns per pair (one thread, 5,000 boxes)", "wrong pairs, % of all n looked at"];
     let lines = lines(&errors, &times);
     let chart = Chart::log("accuracy-index", "From the index of a pair to the pair", axes, lines);
-    let tables = vec![errors, counterexamples(quick), times];
+    let tables = vec![errors, counterexamples(quick), times, paper::table_3(quick), paper::table_4(quick)];
     Ok(BenchReport { charts: vec![chart], ..BenchReport::new("accuracy-index", tables) })
 }
 
@@ -56,10 +58,10 @@ static WAYS: LazyLock<[RootWay; 7]> = LazyLock::new(|| {
     [
         by_root("f32 sqrt", f32::sqrt),
         way("f64 sqrt", f64::EPSILON, row_in_f64),
-        by_root("Carmack 1", newton::<1>),
-        by_root("Carmack 2", newton::<2>),
-        by_root("Carmack 3", newton::<3>),
-        by_root("Carmack 4", newton::<4>),
+        by_root("Carmack 1", newton::<1, false>),
+        by_root("Carmack 2", newton::<2, false>),
+        by_root("Carmack 3", newton::<3, false>),
+        by_root("Carmack 4", newton::<4, false>),
         way("as printed, in f32", f64::INFINITY, row_as_printed),
     ]
 });

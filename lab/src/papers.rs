@@ -7,7 +7,8 @@
 mod avril;
 mod figures;
 mod model;
-mod printed;
+pub(crate) mod printed;
+mod roots;
 mod sides;
 mod table_iii;
 
@@ -22,7 +23,7 @@ const OUR_GRID: Config = Config { engine: Some(Engine::Grid), ..UNSORTED };
 
 type Section = fn(&Setup) -> Result<Vec<Table>, Failure>;
 
-const PARTS: [Section; 3] = [table_iii::tables, figures::tables, avril::tables];
+const PARTS: [Section; 4] = [table_iii::tables, figures::tables, roots::tables, avril::tables];
 
 /// Makes all tables. Fails if two ways to search find different pairs.
 pub fn run(quick: bool) -> Result<BenchReport, Failure> {
@@ -31,6 +32,7 @@ pub fn run(quick: bool) -> Result<BenchReport, Failure> {
     for part in tracked(PARTS, "parts") {
         tables.extend(part(&setup)?);
     }
+    tables.push(figures::sizes());
     let gpu = if setup.is_software() { "pbig, software adapter" } else { "pbig, GPU" };
     let charts = charts(&tables, gpu);
     let head = vec![("software", setup.is_software().to_string()), ("adapter", setup.adapter)];
@@ -56,8 +58,9 @@ fn charts(tables: &[Table], gpu: &str) -> Vec<Chart> {
         line
     };
     let of_steps = [("printed", "printed"), ("pbig, CPU", "ours, CPU"), (gpu, "ours, GPU")];
-    let of_steps =
-        of_steps.map(|(name, side)| steps.line(name, ["objects", "whole, ms"], |row| row[1] == side));
+    let of_steps = of_steps.map(|(name, side)| {
+        steps.line(name, ["objects", "whole, ms"], |row| row[1] == 1.0 && row[2] == side)
+    });
     let of_cells = sizes.into_iter().map(of_size).collect();
     let chart = |name, title, x, lines| Chart::log(name, title, [x, "time, ms"], lines);
     vec![

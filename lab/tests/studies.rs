@@ -31,6 +31,12 @@ fn accuracy_integers_are_right_and_every_error_is_counted() {
         ["integers", "lazy way", "Carmack 1"].map(|label| numbers(all, label, "wrong"));
     assert!(integers.len() == 7 && integers.iter().chain(&lazy).all(|wrong| *wrong == 0.0));
     assert!(coarse[1] > 0.0, "one step is more than the rules mend");
+    // Two steps in f64 give the paper's figures.
+    let table = table(&report, "table_3");
+    for row in table.rows.iter().filter(|row| table.number(row, "steps") == Some(2.0)) {
+        let [paper, ours] = ["paper_percent", "ours_steps_in_f64_percent"].map(|c| table.number(row, c));
+        assert!(paper.zip(ours).is_some_and(|(paper, ours)| (paper - ours).abs() < 1e-4), "{row:?}");
+    }
 }
 
 #[test]
@@ -58,11 +64,13 @@ fn steady_has_every_motion() {
 #[test]
 fn papers_have_every_table_and_counts_fit_what_is_expected() {
     let report = papers::run(true).expect("all ways agree");
-    assert_eq!(report.tables.len(), 6);
+    assert_eq!(report.tables.len(), 11);
     // A device's tables are empty without one.
     assert!(report.tables.iter().all(|table| !table.rows.is_empty() || table.name.contains("GPU")));
-    let off = table(&report, "PBIG figure 8").numbers("off, standard deviations");
-    assert!(off.into_iter().map(f64::abs).fold(0.0, f64::max) < 5.0);
+    for name in ["PBIG figure 8", "PBIG figure 11"] {
+        let off = table(&report, name).numbers("off, standard deviations");
+        assert!(off.into_iter().map(f64::abs).fold(0.0, f64::max) < 5.0, "{name}");
+    }
     // A pair is eight bytes.
     let switches = table(&report, "PBIG table IV: ");
     for row in &switches.rows {

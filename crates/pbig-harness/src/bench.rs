@@ -68,6 +68,17 @@ pub fn alone(case: &str, boxes: usize, pairs: u64, unit: &str, value: Option<f64
 /// Prepares nothing, for [`measured`].
 pub fn unprepared<S>(_: &mut S, _: usize) {}
 
+/// Returns the medians of [`measured`].
+pub fn medians<S>(
+    state: &mut S,
+    sides: usize,
+    effort: Effort,
+    prepare: impl FnMut(&mut S, usize),
+    run: impl FnMut(&mut S, usize) -> Result<f64, Failure>,
+) -> Result<Vec<f64>, Failure> {
+    Ok(measured(state, sides, effort, prepare, run)?.iter().map(|took| took.median).collect())
+}
+
 /// Measures sides that do the same work, round by round. `prepare` gets the round and is not measured; `run` does one side's work
 /// and returns its milliseconds. Sides change places from round to round, because the first in a round warms the caches for the
 /// others. A side's median is the mean of its medians at each place.

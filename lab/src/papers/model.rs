@@ -13,6 +13,9 @@ pub(super) const UNIFORM: Model = Model::boxes(LENGTHS[0], LENGTHS[1]);
 /// Section 6.3 as it is printed.
 pub(super) const GAUSSIAN: Model = Model { space: Space::Normal(NORMAL), ..UNIFORM };
 
+/// Section 6.3 by the reading that gives table III: lower corners, lengths from 0.
+pub(super) const GAUSSIAN_READ: Model = Model { has_corners: true, lengths: [0.0, LENGTHS[1]], ..GAUSSIAN };
+
 /// The distribution of points along each axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Space {

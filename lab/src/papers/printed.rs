@@ -9,6 +9,8 @@ pub(super) const LENGTHS: [f64; 2] = [1.0, 100.0];
 pub(super) const NORMAL: [f64; 2] = [5000.0, 1000.0];
 /// PBIG 6.1, 6.2, 6.4: most boxes.
 pub(super) const MOST_BOXES: usize = 10_000_000;
+/// PBIG 6.4: bytes of the pairs of 10^7 boxes with normal centres, "GB".
+pub(super) const GAUSSIAN_GB: f64 = 8.968;
 /// PBIG 4.1 and 6: threads of a warp, `W` of equation 6.
 pub(super) const WARP: f64 = 32.0;
 /// PBIG 6.1: lengths of the cells of figure 9, beside that of equation 6.
@@ -44,6 +46,36 @@ pub(super) const TABLE_IV: [(&str, Option<f64>, f64); 8] = [
     ("+C+B", Some(2.88), 3562.59),
     ("+P+B", Some(1.92), 5337.236),
     ("+C+P+B", Some(4.81), 2132.998),
+];
+
+/// Avril, table 2: objects, milliseconds with the square root and the "lazy way" without.
+pub(super) const AVRIL_2: [(u64, f64, f64); 3] =
+    [(1000, 0.21, 0.25), (10_000, 2.25, 4.28), (100_000, 29.66, 58.24)];
+
+/// Avril, table 3: numbers; wrong roots in percent by Carmack's constant, with two steps and with three.
+pub(crate) const AVRIL_3: [(u32, [f64; 2]); 6] = [
+    (1000, [2.9, 0.7]),
+    (10_000, [0.89, 0.12]),
+    (100_000, [0.27, 0.035]),
+    (1_000_000, [0.18, 0.011]),
+    (10_000_000, [0.3681, 0.004]),
+    (100_000_000, [0.9847, 0.0134]),
+];
+
+/// Avril, table 4: roots; milliseconds by Carmack's approximation and by CUDA's own root.
+pub(crate) const AVRIL_4: [(u32, [f64; 2]); 4] = [
+    (1_000_000, [0.042, 0.048]),
+    (10_000_000, [0.409, 0.478]),
+    (100_000_000, [4.102, 4.722]),
+    (1_000_000_000, [41.01, 48.01]),
+];
+
+/// Avril, table 5: objects; kernel (ms) and output (microseconds) with a byte a pair, and with a bit.
+pub(super) const AVRIL_5: [(u64, [f64; 2], [f64; 2]); 4] = [
+    (100, [0.03, 14.35], [0.03, 7.75]),
+    (1000, [2.70, 842.75], [2.72, 111.18]),
+    (5000, [73.95, 21_428.0], [74.14, 2612.42]),
+    (7500, [163.60, 45_865.94], [162.03, 5687.20]),
 ];
 
 /// Avril, table 6: objects; milliseconds of a step.
