@@ -70,14 +70,6 @@ pub(crate) const AVRIL_4: [(u32, [f64; 2]); 4] = [
     (1_000_000_000, [41.01, 48.01]),
 ];
 
-/// Avril, table 5: objects; kernel (ms) and output (microseconds) with a byte a pair, and with a bit.
-pub(super) const AVRIL_5: [(u64, [f64; 2], [f64; 2]); 4] = [
-    (100, [0.03, 14.35], [0.03, 7.75]),
-    (1000, [2.70, 842.75], [2.72, 111.18]),
-    (5000, [73.95, 21_428.0], [74.14, 2612.42]),
-    (7500, [163.60, 45_865.94], [162.03, 5687.20]),
-];
-
 /// Avril, table 6: objects; milliseconds of a step.
 pub(super) const AVRIL_6: [(usize, f64); 4] =
     [(1000, 0.25), (10_000, 2.35), (100_000, 27.91), (1_000_000, 291.89)];

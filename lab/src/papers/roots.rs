@@ -69,9 +69,13 @@ const EFFORT: Effort = Effort { warm_up: 0, rounds: WAYS.len(), budget: Duration
 /// The pairs of each way, its milliseconds for all ids, and for roots and for the lazy way all ids over those looked at.
 type WaysFound = ([u64; WAYS.len()], Vec<f64>, [f64; 2]);
 
+fn unit_cubes(n: usize) -> Vec<Aabb> {
+    BoxSet::named("unit").expect("a set of the harness").boxes(n, 1)
+}
+
 /// Measures all ways. Fails if ways that looked at the same pairs have not found the same.
 fn all_ways(n: u64, most: u64) -> Result<WaysFound, Failure> {
-    let boxes = cubes(n as usize, 1.0, 1.0, 1);
+    let boxes = unit_cubes(n as usize);
     let ids = [pair_count(n), lazy_ids(n as i64) as u64].map(|ids| stretches(ids, most));
     let mut pairs = [0; WAYS.len()];
     let ms = medians(&mut pairs, WAYS.len(), EFFORT, unprepared, |pairs, way| {
@@ -117,7 +121,7 @@ mod tests {
 
     #[test]
     fn all_ways_find_the_pairs_of_brute_force() {
-        let pairs = oracle::pairs(&cubes(300, 1.0, 1.0, 1)).len() as u64;
+        let pairs = oracle::pairs(&unit_cubes(300)).len() as u64;
         let (found, _, times) = all_ways(300, MOST_IDS).expect("all agree");
         assert_eq!((found, times), ([pairs; WAYS.len()], [1.0; 2]));
         // In stretches, which end within a block.
