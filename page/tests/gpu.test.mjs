@@ -100,6 +100,18 @@ test("where the GPU fails or cannot be opened the CPU goes on, and the page says
     }
 });
 
+test("a step that the GPU declines shows no time of the GPU", async () => {
+    const page = await openWith("gpu.js", "Gpu.prototype.find = async () => undefined;");
+    await waitForSteps(page, 2);
+    await page.click("#broad-phase .gpu");
+    await page.waitForFunction(() => document.getElementById("plan").textContent.includes("declined"));
+    await waitForSteps(page, 10 + (await numberOf(page, "#steps")));
+    const times = await page.$$eval("#times td:nth-child(4)", (cells) => cells.map((cell) => cell.textContent));
+    assert.deepEqual(times.slice(-4), ["–", "–", "–", "–"]);
+    assert.equal(await page.$eval("[name=broad-phase]:checked", ({ value }) => value), "gpu");
+    await page.close();
+});
+
 test("a scene that begins with a GPU that cannot be opened begins with the CPU", async () => {
     const planted = "GPUAdapter.prototype.requestDevice = async () => { throw new Error('planted'); };";
     const page = await openWith("worker.js", planted, "&broad-phase=gpu");

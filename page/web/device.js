@@ -4,6 +4,7 @@ let memory;
 let search;
 let pairs;
 let failure;
+let hasDeclined = false;
 
 /** Sets the memory of the simulation's module, and the function that returns a promise of the pairs of boxes and filters. */
 export function connect(moduleMemory, searchFunction) {
@@ -19,6 +20,7 @@ async function find(boxes, filters, count) {
         // The CPU does the work, as if the GPU had declined it.
         failure = error;
     }
+    hasDeclined ||= !pairs;
 }
 
 /** Suspends the calling module until the GPU has answered. */
@@ -27,6 +29,13 @@ export const find_pairs = globalThis.WebAssembly?.Suspending ? new WebAssembly.S
 /** Returns the pairs that were found last: ids, pair after pair. Nothing if the GPU declined, or failed. */
 export function take_pairs() {
     return pairs;
+}
+
+/** Returns true if the GPU declined a search since the last call, or failed: the CPU did the work. */
+export function takeDeclined() {
+    const taken = hasDeclined;
+    hasDeclined = false;
+    return taken;
 }
 
 /** Returns the error of a search since the last call, if there was one. */
