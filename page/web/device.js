@@ -20,7 +20,6 @@ async function find(boxes, filters, count) {
         // The CPU does the work, as if the GPU had declined it.
         failure = error;
     }
-    hasDeclined ||= !pairs;
 }
 
 /** Suspends the calling module until the GPU has answered. */
@@ -28,6 +27,7 @@ export const find_pairs = globalThis.WebAssembly?.Suspending ? new WebAssembly.S
 
 /** Returns the pairs that were found last: ids, pair after pair. Nothing if the GPU declined, or failed. */
 export function take_pairs() {
+    hasDeclined ||= !pairs;
     return pairs;
 }
 
