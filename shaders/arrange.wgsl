@@ -1,4 +1,4 @@
-// Schedule: computes the number of workgroups of the first check kernels. If a list did not fit, or if there are more tests
+// Schedule: computes the numbers of workgroups that check a chunk of the work items. If a list did not fit, or if there are more tests
 // than the plan promised, there are none: the host makes larger buffers, or another plan, and maps again.
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -14,9 +14,13 @@ fn write_dispatch(at: u32, groups: u32) {
     dispatches[at + 2u] = 1u;
 }
 
+// Returns the number of a chunk's work items, of all that there are.
+fn items_of(all: u32, first: u32, most: u32) -> u32 {
+    return select(0u, min(all - min(all, first), most), lists_fit() && tests_fit());
+}
+
 @compute @workgroup_size(1)
 fn arrange() {
-    let fits = lists_fit() && tests_fit();
-    write_dispatch(0u, select(0u, min(counters.small_items, chunk.small_items), fits));
-    write_dispatch(3u, select(0u, min(counters.large_items, chunk.large_items), fits));
+    write_dispatch(0u, items_of(counters.small_items, chunk.first_small, chunk.small_items));
+    write_dispatch(3u, items_of(counters.large_items, chunk.first_large, chunk.large_items));
 }

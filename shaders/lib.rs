@@ -117,6 +117,8 @@ pub struct Kernel {
     pub stage: Stage,
     /// Buffers of group 0, by binding number.
     pub bindings: &'static [Buffer],
+    /// True if the override `ROWS` is set.
+    pub scans_rows: bool,
     parts: &'static [&'static str],
     body: &'static str,
 }
@@ -150,6 +152,7 @@ macro_rules! kernels {
             name: $name,
             stage: Stage::$stage,
             bindings: &[$(Buffer::$binding),*],
+            scans_rows: false,
             parts: &[$($part),*],
             body: include_str!(concat!($name, ".wgsl")),
         };)*
@@ -199,12 +202,19 @@ kernels! {
     RANK_WINDOWS Sort "rank_windows" [ROWS, PIECES, BLOCK_SCAN] (Params, Grouped, LongRows, Windows, Out);
 }
 
+/// Sort: the scan, of the rows of pairs instead of the cells.
+pub const SCAN_OF_ROWS: &[&Kernel; 2] = &[
+    &Kernel { bindings: &[Buffer::Params, Buffer::Rows, Buffer::Sums], scans_rows: true, ..SCAN_BLOCKS },
+    &Kernel { scans_rows: true, ..SCAN_SUMS },
+];
+
 /// For tests: computes the pairs of given indices.
 #[doc(hidden)]
 pub const INDEX_PAIRS: Kernel = Kernel {
     name: "index_pairs",
     stage: Stage::Map,
     bindings: &[Buffer::Params, Buffer::Out],
+    scans_rows: false,
     parts: &[PAIR_INDEX],
     body: include_str!("tests/index_pairs.wgsl"),
 };

@@ -51,6 +51,14 @@ const LOSES_DEVICE = `{
     };
 }`;
 
+// No search brings pairs.
+const DECLINES = `{
+    const { Suspending } = WebAssembly;
+    WebAssembly.Suspending = function () {
+        return new Suspending(async () => {});
+    };
+}`;
+
 test("the simulation has the same pairs with the GPU as with the CPU", async () => {
     const page = await openAs(browser, server.address + SCENE, DESKTOP, "light");
     await waitForSteps(page, 1);
@@ -98,6 +106,18 @@ test("where the GPU fails or cannot be opened the CPU goes on, and the page says
         await page.screenshot({ path: `${shots}/gpu-failed.png` });
         await page.close();
     }
+});
+
+test("a step that the GPU declines shows no time of the GPU", async () => {
+    const page = await openWith("worker.js", DECLINES);
+    await waitForSteps(page, 2);
+    await page.click("#broad-phase .gpu");
+    await page.waitForFunction(() => location.search.includes("broad-phase=gpu"));
+    await waitForSteps(page, 10 + (await numberOf(page, "#steps")));
+    const times = await page.$$eval("#times td:nth-child(4)", (cells) => cells.map((cell) => cell.textContent));
+    assert.deepEqual(times.slice(-4), ["–", "–", "–", "–"]);
+    assert.equal(await page.$eval("[name=broad-phase]:checked", ({ value }) => value), "gpu");
+    await page.close();
 });
 
 test("a scene that begins with a GPU that cannot be opened begins with the CPU", async () => {

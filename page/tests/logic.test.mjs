@@ -151,3 +151,23 @@ test("a browser without WebGPU is told why", async () => {
     const adapter = {};
     assert.equal(await findAdapter({ requestAdapter: async () => adapter }, true), adapter);
 });
+
+test("a search without pairs is the CPU's, once", async () => {
+    // What it returns in a browser can be called by a module alone.
+    WebAssembly.Suspending = function (suspended) {
+        return suspended;
+    };
+    const { connect, find_pairs, take_pairs, takeDeclined, takeFailure } = await import("../web/device.js");
+    const answers = [[0, 1], undefined, new Error("planted")];
+    const found = [];
+    connect({ buffer: new ArrayBuffer(48) }, async () => {
+        const answer = answers.shift();
+        if (answer instanceof Error) throw answer;
+        return answer;
+    });
+    while (answers.length > 0) {
+        await find_pairs(0, 0, 2);
+        found.push([take_pairs(), takeDeclined(), takeDeclined(), takeFailure()?.message]);
+    }
+    assert.deepEqual(found, [[[0, 1], false, false, undefined], [undefined, true, false, undefined], [undefined, true, false, "planted"]]);
+});

@@ -4,6 +4,7 @@ let memory;
 let search;
 let pairs;
 let failure;
+let hasDeclined = false;
 
 /** Sets the memory of the simulation's module, and the function that returns a promise of the pairs of boxes and filters. */
 export function connect(moduleMemory, searchFunction) {
@@ -26,7 +27,15 @@ export const find_pairs = globalThis.WebAssembly?.Suspending ? new WebAssembly.S
 
 /** Returns the pairs that were found last: ids, pair after pair. Nothing if the GPU declined, or failed. */
 export function take_pairs() {
+    hasDeclined ||= !pairs;
     return pairs;
+}
+
+/** Returns true if the GPU declined a search since the last call, or failed: the CPU did the work. */
+export function takeDeclined() {
+    const taken = hasDeclined;
+    hasDeclined = false;
+    return taken;
 }
 
 /** Returns the error of a search since the last call, if there was one. */

@@ -208,7 +208,8 @@ class Page {
         if (!this.#simulation) return;
         const frame = await this.#simulation.step();
         if (frame.failure) this.#goOnWithCpu(frame.failure);
-        else this.#times.add(frame);
+        // A step that the GPU leaves to the CPU shows the time of neither.
+        else if (!frame.hasDeclined) this.#times.add(frame);
         this.#show(frame);
         if (this.#replay?.left && frame.steps >= REPLAY_STEPS) await this.#replayNext();
     }

@@ -25,7 +25,8 @@ export class Simulation {
         return this.#call("build", settings);
     }
 
-    /** Advances by one step, and returns the frame. Its `failure` says why the GPU failed; then the CPU goes on. */
+    /** Advances by one step, and returns the frame. Its `failure` says why the GPU failed; then the CPU goes on. Its `hasDeclined` is
+     * true if the CPU did the GPU's work. */
     step() {
         return this.#call("step");
     }

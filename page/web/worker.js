@@ -1,6 +1,6 @@
 // Steps the world apart from the page, which stays responsive while a step takes long.
 
-import { connect, takeFailure } from "./device.js";
+import { connect, takeDeclined, takeFailure } from "./device.js";
 import { describe, loadModule } from "./load.js";
 import init, { Simulation, panic_message, scenes } from "pbig-page-module";
 
@@ -34,7 +34,7 @@ const methods = {
         const isNewScenery = await advance(simulation, used);
         const failure = takeGpuFailure();
         if (failure) change("pbig");
-        return { ...(isNewScenery && readScenery()), ...readFrame(), broadPhase: used, failure };
+        return { ...(isNewScenery && readScenery()), ...readFrame(), broadPhase: used, hasDeclined: takeDeclined(), failure };
     },
 
     /** Returns why the GPU could not be opened; then the broad phase is pbig's on the CPU. */
@@ -90,6 +90,7 @@ function failIf(reason) {
 }
 
 async function advance(world, name) {
+    takeDeclined(); // It may be that of another world.
     if (name === "gpu") await advanceSuspended(world.__wbg_ptr);
     else world.advance();
     return world.end_step();

@@ -201,12 +201,15 @@ fn memory_follows_what_is_needed_down_as_well_as_up() {
     assert_eq!(difference(&find(&mut finder, &many).0, &on_cpu(&many)), None);
 }
 
-/// A device that is hardware, whatever its adapter says.
+/// A device that is hardware, whatever its adapter says, and the settings of its next calls, the last one first.
 #[derive(Clone, Debug)]
-struct Hardware(GpuFinder);
+struct Hardware(GpuFinder, Vec<GpuOptions>);
 
 impl PairDevice for Hardware {
     fn find_all(&mut self, request: &SearchRequest<'_>, to: &mut DeviceFound) -> Result<(), DeviceFailure> {
+        if let Some(options) = self.1.pop() {
+            self.0 = std::mem::take(&mut self.0).with_options(options);
+        }
         self.0.find_all(request, to)
     }
     fn name(&self) -> Option<&str> {
@@ -234,7 +237,7 @@ fn auto_uses_hardware_for_many_boxes_and_no_software() {
         (soft.report().plan.no_device, soft.report().device.is_none()),
         (software, software.is_some())
     );
-    let mut finder = Finder::with_device(Config::DEFAULT, Box::new(Hardware(device)));
+    let mut finder = Finder::with_device(Config::DEFAULT, Box::new(Hardware(device, vec![])));
     for (many, why) in [(true, None), (false, Some(NoDevice::FewBoxes)), (true, None)] {
         let found = finder.find(&boxes[usize::from(!many)..]).expect("within the limits").to_vec();
         assert_eq!((finder.report().plan.no_device, finder.report().device.is_some()), (why, many));

@@ -130,16 +130,16 @@ mod tests {
         let hardware = Some("NVIDIA H100 (software edition) (discrete, vulkan)");
         assert_eq!(no_gpu(hardware, None), None);
         assert_eq!(no_gpu(hardware, Some("it was lost")).as_deref(), Some("the CPU did work: it was lost"));
-        let declined = |what: &GpuError| {
+        let declined = |what: &str| {
             no_gpu(hardware, Some(&format!("{DECLINED}{what}: the CPU does the work"))).expect("a reason")
         };
         assert_eq!(
-            declined(&GpuError::TooLarge { what: "out", bytes: 9, limit: 8 }),
+            declined("the buffer out needs 9 bytes, but the device or GpuOptions::max_bytes allows 8"),
             "the GPU declined the boxes: the buffer out needs 9 bytes, but the device allows 8"
         );
         assert_eq!(
-            declined(&GpuError::OverBudget { what: "out", bytes: 9, limit: 8 }),
-            "the GPU declined the boxes: with the buffer out the device's buffers need 9 bytes, but pbig allows 8"
+            declined("the device's buffers need 9 bytes, but GpuOptions::max_total_bytes allows 8"),
+            "the GPU declined the boxes: the device's buffers need 9 bytes, but pbig allows 8"
         );
         let late = format!("{}: the CPU does the work", GpuError::Timeout(Duration::from_secs(30)));
         let late = no_gpu(hardware, Some(&late));

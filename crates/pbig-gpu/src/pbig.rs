@@ -30,7 +30,7 @@ impl Summary {
     /// Returns the summary of the boxes. It takes 1.2 ns a box.
     pub fn of(boxes: &[Aabb]) -> Self {
         let classes = size_classes(boxes, threads_for(boxes.len() / PIECE));
-        Self { valid: classes.iter().map(|class| class.boxes).sum(), classes, sample: sampled(boxes) }
+        Self::with(classes, spread_evenly(boxes.len(), Self::SAMPLE).map(|i| boxes[i]))
     }
 
     /// Returns the summary that the kernel `measure` has made of this number of boxes: see [`crate::layout::SUMMARY_WORDS`].
@@ -42,10 +42,13 @@ impl Summary {
             SizeClass { boxes, extent: [x, y, z].map(f32::from_bits) }
         });
         let boxes: &[Aabb] = bytemuck::cast_slice(sample);
-        let is_ordinary = |b: &&Aabb| b.is_valid() && size_class_of(b.extents()) < OVERSIZE_CLASS;
+        Self::with(classes, boxes.iter().take(Self::SAMPLE.min(count as usize)).copied())
+    }
+
+    fn with(classes: SizeClasses, sampled: impl Iterator<Item = Aabb>) -> Self {
+        let is_ordinary = |b: &Aabb| b.is_valid() && size_class_of(b.extents()) < OVERSIZE_CLASS;
         let valid = classes.iter().map(|class| class.boxes).sum();
-        let sampled = boxes.iter().take(Self::SAMPLE.min(count as usize));
-        Self { valid, classes, sample: sampled.filter(is_ordinary).copied().collect() }
+        Self { valid, classes, sample: sampled.filter(is_ordinary).collect() }
     }
 
     /// Returns about the number of overlapping pairs, as the sample tells; 0 if too few of its boxes overlap to tell.
@@ -74,12 +77,6 @@ impl Summary {
         let widening = (high - low) * 0.125;
         (low - widening, high + widening)
     }
-}
-
-/// Returns the sample of [`Summary`].
-pub fn sampled(boxes: &[Aabb]) -> Vec<Aabb> {
-    let sampled = spread_evenly(boxes.len(), Summary::SAMPLE).map(|i| boxes[i]);
-    sampled.filter(|b| b.is_valid() && size_class_of(b.extents()) < OVERSIZE_CLASS).collect()
 }
 
 /// Returns the number of cells along a length.

@@ -111,7 +111,37 @@ pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
         let looked_at = times.map(|times| 100.0 / times);
         table.row(cells![n, root, lazy, lazy / root, ..ms.clone(), ..ratios, pairs, ..looked_at]);
     }
-    Ok(vec![table])
+    Ok(vec![table, rows_on_device(setup)?])
+}
+
+/// Indices that a device maps at a time, 12 bytes each.
+const INDICES: u32 = 1 << 22;
+
+/// Equation 1 on a device, for every index: the paper's rules mend a row that is off by one, pbig's integers any row.
+fn rows_on_device(setup: &Setup) -> Result<Table, Failure> {
+    let columns = "objects | indices | rows off by one | rows off by more | wrong pairs";
+    let mut table = Table::new("Avril equation 1: every index, GPU", columns);
+    let sizes: &[u32] = if setup.quick { &[100, 2000] } else { &[100, 1000, 5000, 10_000, 32_768] };
+    for &n in sizes {
+        let Some(gpu) = setup.for_boxes(n as usize) else { continue };
+        let (indices, mut off) = (pair_count(n.into()) as u32, [0u64; 3]);
+        let mut wanted = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));
+        for first in (0..indices).step_by(INDICES as usize) {
+            let found = gpu.index_pairs(n, first, INDICES.min(indices - first));
+            for [estimate, a, b] in found.map_err(|error| error.to_string())? {
+                let pair = wanted.next().expect("as many pairs as indices");
+                match estimate.abs_diff(pair[0]) {
+                    0 => {}
+                    1 => off[0] += 1,
+                    _ => off[1] += 1,
+                }
+                off[2] += u64::from([a, b] != pair);
+            }
+        }
+        check(off[2] == 0, || format!("{} of {indices} indices lead to wrong pairs of {n}", off[2]))?;
+        table.row(cells![n, indices, ..off]);
+    }
+    Ok(table)
 }
 
 #[cfg(test)]

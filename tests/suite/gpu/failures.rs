@@ -1,6 +1,6 @@
 //! Contract: a device that fails or is lost at any moment costs no pair and no event.
 
-use super::{find, on_cpu, set, with_device};
+use super::{Hardware, find, on_cpu, set, with_device};
 use pbig_core::{
     Backend, BroadPhase, Config, DeviceFailure, DeviceFound, Finder, PairDevice, SearchRequest, oracle,
 };
@@ -37,6 +37,20 @@ fn refuse(device: &wgpu::Device) {
     _ = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
 }
 
+/// A texture of 275 GB, which wgpu allows and no device has.
+fn exhaust(device: &wgpu::Device) {
+    _ = device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width: 8192, height: 8192, depth_or_array_layers: 256 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba32Float,
+        usage: wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+}
+
 /// Returns a device that fails at the wait after this number of waits.
 fn failing(fault: Fault, waits: u32) -> GpuFinder {
     let device = GpuFinder::new().expect("an adapter");
@@ -55,7 +69,8 @@ fn failing(fault: Fault, waits: u32) -> GpuFinder {
 fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
     needs_gpu!();
     let config = Config { margin: 0.05, backend: Backend::Device, ..Config::DEFAULT };
-    let faults: [(Fault, &str); 3] = [(lose, "lost"), (panic, "lost"), (refuse, "refused")];
+    let faults: [(Fault, &str); 4] =
+        [(lose, "lost"), (panic, "lost"), (refuse, "refused"), (exhaust, "out of device memory")];
     for ((fault, words), waits) in faults.into_iter().flat_map(|fault| [0, 1, 2, 5].map(|at| (fault, at))) {
         for pause in [Duration::ZERO, Duration::from_secs(3600)] {
             let options = GpuOptions { pause, first_bytes: 0, chunk: [12, 8], ..GpuOptions::DEFAULT };
@@ -101,30 +116,6 @@ fn a_hung_device_costs_the_patience_once() {
     assert_eq!(result, Err(DeviceFailure::Failed(why.into())));
 }
 
-/// An app's device whose first call has no time.
-#[derive(Clone, Debug)]
-struct Busy(GpuFinder, bool);
-
-impl PairDevice for Busy {
-    fn find_all(&mut self, request: &SearchRequest<'_>, to: &mut DeviceFound) -> Result<(), DeviceFailure> {
-        let patience = if std::mem::take(&mut self.1) { Duration::ZERO } else { Duration::from_secs(30) };
-        let options = GpuOptions { pause: Duration::ZERO, patience, ..GpuOptions::DEFAULT };
-        let mut gpu = std::mem::take(&mut self.0).with_options(options);
-        let result = gpu.find_all(request, to);
-        self.0 = gpu;
-        result
-    }
-    fn name(&self) -> Option<&str> {
-        self.0.name()
-    }
-    fn is_software(&self) -> bool {
-        false
-    }
-    fn clone_box(&self) -> Box<dyn PairDevice> {
-        Box::new(self.clone())
-    }
-}
-
 /// Contract: a device of the app that was busy for too long is lost for that call only.
 #[test]
 fn an_apps_device_that_was_busy_is_used_again_when_it_is_idle() {
@@ -134,7 +125,9 @@ fn an_apps_device_that_was_busy_is_used_again_when_it_is_idle() {
     let (device, queue) = device.expect("a device with WebGPU's default limits");
     let finder = GpuFinder::from_device(device, queue).expect("default limits are enough");
     let config = Config { backend: Backend::Device, ..Config::DEFAULT };
-    let mut finder = Finder::with_device(config, Box::new(Busy(finder, true)));
+    let usual = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
+    let no_time = GpuOptions { patience: Duration::ZERO, ..usual };
+    let mut finder = Finder::with_device(config, Box::new(Hardware(finder, vec![usual, no_time])));
     let boxes = set("pile", 20_000);
     let wanted = on_cpu(&boxes);
     let mut whys = Vec::new();

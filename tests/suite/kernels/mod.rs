@@ -167,14 +167,28 @@ fn arrange_dispatches_nothing_without_capacity() {
         ..Counters::default()
     };
     let capacities = [10, 20, 100_000, 32_769];
-    let dispatches = |capacities: [u32; 4], large_items: u32, most_tests: u32| {
+    let of_chunk = |capacities: [u32; 4], chunk: Chunk, most_tests: u32| {
         let mut before = State { counters: found, ..State::default() };
         set_capacities(&mut before.params, &capacities);
         before.params.most_tests = most_tests;
-        before.chunk = Chunk { small_items: 1 << 16, large_items, ..Chunk::default() };
+        before.chunk = chunk;
         assert_eq!(fault(twin("arrange"), &GpuOptions::DEFAULT, &before), None, "{capacities:?}");
         after_twin(twin("arrange"), &before).dispatches
     };
+    let items = |first: [u32; 2], [small_items, large_items]: [u32; 2]| Chunk {
+        first_small: first[0],
+        small_items,
+        first_large: first[1],
+        large_items,
+        ..Chunk::default()
+    };
+    let dispatches = |capacities: [u32; 4], large_items: u32, most_tests: u32| {
+        of_chunk(capacities, items([0; 2], [1 << 16, large_items]), most_tests)
+    };
+    let later = [([1 << 16, 32_768], [32_768, 2, 1, 1, 1, 1]), ([u32::MAX, 32_769], [0, 0, 1, 0, 0, 1])];
+    for (first, wanted) in later {
+        assert_eq!(of_chunk(capacities, items(first, [1 << 16, 5]), 77)[..6], wanted, "from {first:?}");
+    }
     assert_eq!(dispatches(capacities, 5, 77)[..6], [32_768, 2, 1, 5, 1, 1]);
     assert_eq!(dispatches(capacities, u32::MAX >> 1, 77)[..6], [32_768, 2, 1, 32_768, 2, 1]);
     assert_eq!(dispatches(capacities, 5, 76)[..6], [0, 0, 1, 0, 0, 1], "too many tests");

@@ -362,8 +362,12 @@ pub(super) fn arrange(s: &mut State) {
     let found = s.counters;
     let (lists_fit, tests_fit) = fits(s);
     let fits = lists_fit && tests_fit;
-    let groups = |items: u32| if fits { [items.min(32_768), items.div_ceil(32_768)] } else { [0, 0] };
-    let [x, y] = groups(found.small_items.min(s.chunk.small_items));
-    let [u, v] = groups(found.large_items.min(s.chunk.large_items));
+    let groups = |all: u32, first: u32, most: u32| {
+        let items = if fits { all.saturating_sub(first).min(most) } else { 0 };
+        [items.min(32_768), items.div_ceil(32_768)]
+    };
+    let Chunk { first_small, small_items, first_large, large_items, .. } = s.chunk;
+    let [x, y] = groups(found.small_items, first_small, small_items);
+    let [u, v] = groups(found.large_items, first_large, large_items);
     s.dispatches[..6].copy_from_slice(&[x, y, 1, u, v, 1]);
 }

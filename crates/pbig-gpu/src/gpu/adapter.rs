@@ -31,9 +31,7 @@ fn rank(kind: wgpu::DeviceType, low_power: bool) -> usize {
 
 /// Returns the adapter of the given name, or of `WGPU_ADAPTER_NAME`, or the best.
 pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
-    if let Some(value) = unknown_api() {
-        return Err(GpuError::UnknownApi(value));
-    }
+    check_api()?;
     let wanted = name.map(str::to_owned).or_else(|| std::env::var("WGPU_ADAPTER_NAME").ok());
     let all = best_first().await;
     let names: Vec<_> = all.iter().map(|adapter| adapter.get_info().name).collect();
@@ -63,10 +61,14 @@ fn place_of(wanted: Option<&str>, names: &[String]) -> Result<usize, GpuError> {
     })
 }
 
-/// Returns the value of `WGPU_BACKEND` if it names no API that wgpu knows.
-fn unknown_api() -> Option<String> {
-    let value = std::env::var("WGPU_BACKEND").ok()?;
-    wgpu::Backends::from_comma_list(&value).is_empty().then_some(value)
+/// Returns an error if `WGPU_BACKEND` names no API that wgpu knows.
+fn check_api() -> Result<(), GpuError> {
+    match std::env::var("WGPU_BACKEND") {
+        Ok(api) if wgpu::Backends::from_comma_list(&api).is_empty() => Err(GpuError::NoAdapter(format!(
+            ": WGPU_BACKEND={api:?} names no API (known: vulkan, metal, dx12, gl)"
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Returns an adapter's name, kind and API, as reports show them.

@@ -11,12 +11,9 @@ pub const DECLINED: &str = "the device declined: ";
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpuError {
-    /// There is no adapter, or none of the wanted name: the name in words, and those that exist.
+    /// There is no adapter, or none of the wanted name: the name in words, and those that exist; or `WGPU_BACKEND` names no API.
     #[error("no GPU adapter{0}")]
     NoAdapter(String),
-    /// `WGPU_BACKEND` has this value, which names no API that wgpu knows, so no adapter is looked for.
-    #[error("no GPU adapter: WGPU_BACKEND={0:?} names no API (known: vulkan, metal, dx12, gl)")]
-    UnknownApi(String),
     /// The adapter refused to open a device, for this reason.
     #[error("the adapter opened no device: {0}")]
     NoDevice(String),
@@ -41,39 +38,12 @@ pub enum GpuError {
     /// wgpu refused a shader or a command.
     #[error("refused by wgpu: {0}")]
     Refused(String),
-    /// A buffer would be larger than a limit allows.
-    #[error("the buffer {what} needs {bytes} bytes, but the device or GpuOptions::max_bytes allows {limit}")]
-    TooLarge {
-        /// The buffer's name.
-        what: &'static str,
-        /// The needed size, in bytes.
-        bytes: u64,
-        /// The limit, in bytes.
-        limit: u64,
-    },
-    /// The boxes may have more entries of cells than 32 bits count.
-    #[error(
-        "{boxes} boxes may have {entries} entries in cells, but the device counts up to {max}",
-        max = u32::MAX
-    )]
-    TooManyEntries {
-        /// The number of boxes.
-        boxes: u32,
-        /// The largest number of their entries.
-        entries: u64,
-    },
-    /// All buffers together would be larger than [`crate::GpuOptions::max_total_bytes`].
-    #[error(
-        "with the buffer {what} the device's buffers need {bytes} bytes, but GpuOptions::max_total_bytes allows {limit}"
-    )]
-    OverBudget {
-        /// The name of the buffer that was to be made.
-        what: &'static str,
-        /// The size of all buffers with it, in bytes.
-        bytes: u64,
-        /// The limit, in bytes.
-        limit: u64,
-    },
+    /// The device works, but leaves the call to the CPU, for this reason: a list exceeds a limit, or there are too many tests.
+    #[error("{0}")]
+    Declined(String),
+    /// There are more pairs than the caller allows.
+    #[error("there are more pairs than the caller allows")]
+    TooManyPairs,
     /// An argument is wrong, for this reason.
     #[error("{0}")]
     Argument(String),
@@ -85,41 +55,20 @@ pub enum GpuError {
     Paused(String),
 }
 
-/// Reason why a search on a device ended early.
-#[derive(Debug, PartialEq)]
-pub(super) enum Failure {
-    /// There are more pairs than the caller allows.
-    TooManyPairs,
-    /// The CPU takes less work, for this reason.
-    Declined(String),
-    /// The device failed, and the CPU can do the work.
-    Device(GpuError),
-}
-
 impl GpuError {
-    /// Returns true if the set is too large for the device or for the options.
-    pub(super) fn is_of_large_set(&self) -> bool {
-        matches!(self, Self::TooLarge { .. } | Self::TooManyEntries { .. } | Self::OverBudget { .. })
+    /// Returns the error of a buffer of these bytes, where a limit allows fewer.
+    pub(super) fn too_large(what: &str, bytes: u64, limit: u64) -> Self {
+        Self::Declined(format!(
+            "the buffer {what} needs {bytes} bytes, but the device or GpuOptions::max_bytes allows {limit}"
+        ))
     }
-}
 
-impl<E: Into<GpuError>> From<E> for Failure {
-    fn from(error: E) -> Self {
-        match error.into() {
-            // The device works: it is the set that is too large.
-            error if error.is_of_large_set() => Self::Declined(error.to_string()),
-            error => Self::Device(error),
-        }
-    }
-}
-
-impl Failure {
-    /// Returns the failure as the core knows it.
+    /// Returns the error as the core knows it.
     pub(super) fn for_core(self) -> DeviceFailure {
         match self {
             Self::TooManyPairs => DeviceFailure::TooManyPairs,
             Self::Declined(why) => DeviceFailure::Declined(format!("{DECLINED}{why}")),
-            Self::Device(error) => DeviceFailure::Failed(error.to_string()),
+            error => DeviceFailure::Failed(error.to_string()),
         }
     }
 }

@@ -2,11 +2,12 @@
 //! length a repetition.
 
 use super::GpuError;
-use super::kept_plan::KeptPlan;
+use super::kept_plan::{FINER_RETRY, KeptPlan};
 use super::passes;
 use super::storage::Storage;
 use crate::GpuOptions;
 use crate::layout::{COUNTED, Counters, FILTERED, LANES, Params, Totals, UNPLANNED};
+use crate::pbig::Summary;
 use crate::policy::WIDEST_ITEM;
 use pbig_shaders::Buffer;
 
@@ -17,11 +18,11 @@ const EXTRA_BOXES: u64 = 4096;
 const MOST_ALL_PAIRS: u32 = 32_768;
 
 /// The plan and the lengths that earlier calls have told.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Forecast {
     pub(super) plan: Option<KeptPlan>,
-    /// Factor on the cells of a new plan: below 1 if the last plan made too many tests for the boxes that it was made for.
-    pub(super) cell_factor: f32,
+    /// A new plan gets finer cells, because the last plan made too many tests for the boxes that it was made for.
+    pub(super) is_finer: bool,
     /// Lengths of the lists of the last map.
     pub(super) lists: Counters,
     /// Words of pairs of the last call.
@@ -29,8 +30,16 @@ pub(super) struct Forecast {
 }
 
 impl Forecast {
-    pub(super) fn new() -> Self {
-        Self { plan: None, cell_factor: 1.0, lists: Counters::default(), words: 0 }
+    /// Makes a plan for this number of boxes, on a device with buffers of at most this size.
+    pub(super) fn make_plan(&mut self, summary: &Summary, boxes: u32, options: &GpuOptions, max_bytes: u64) {
+        let cell_factor = if self.is_finer { FINER_RETRY } else { 1.0 };
+        self.plan = Some(KeptPlan::new(summary, boxes, (options, cell_factor), max_bytes));
+    }
+
+    /// Forgets lengths that exceed a limit, and frees all buffers, which leave no room for other boxes.
+    pub(super) fn forget_lengths(&mut self, storage: &mut Storage) {
+        (self.lists, self.words) = Default::default();
+        storage.free();
     }
 
     /// Makes the buffers of a call, and returns its parameters. Without a plan, only few boxes are searched.

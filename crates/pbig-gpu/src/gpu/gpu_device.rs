@@ -2,7 +2,7 @@
 
 use super::{GpuError, adapter};
 use crate::GpuOptions;
-use pbig_shaders::{Buffer, KERNELS, Kernel, SCAN_BLOCKS, SCAN_SUMS};
+use pbig_shaders::{KERNELS, Kernel, SCAN_OF_ROWS};
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -11,34 +11,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Work of a test before each wait: it may destroy the device, or panic as wgpu does.
 pub(super) type Hook = Box<dyn FnMut(&wgpu::Device) + Send>;
 
-/// The choices that are fixed when a pipeline is made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Variant {
-    is_balanced: bool,
-    /// The scan is of rows of pairs instead of cells.
-    rows: bool,
+/// The name of a kernel, and true if it scans rows.
+pub(super) type KernelId = (&'static str, bool);
+
+pub(super) fn id_of(kernel: &Kernel) -> KernelId {
+    (kernel.name, kernel.scans_rows)
 }
 
-impl Variant {
-    pub(super) fn new(options: &GpuOptions) -> Self {
-        Self { is_balanced: options.load_balancing, rows: false }
-    }
-
-    pub(super) fn of_rows(self) -> Self {
-        Self { rows: true, ..self }
-    }
-
-    /// Returns the buffer for a binding.
-    pub(super) fn bound(self, binding: Buffer) -> Buffer {
-        if self.rows && binding == Buffer::Cells { Buffer::Rows } else { binding }
-    }
-
-    /// Returns the values of the overrides that the source declares.
-    fn constants(self, source: &str) -> Vec<(&'static str, f64)> {
-        let flag = |is_set: bool| f64::from(u8::from(is_set));
-        let all = [("BALANCED", flag(self.is_balanced)), ("ROWS", flag(self.rows))];
-        all.into_iter().filter(|(name, _)| source.contains(&format!("override {name}"))).collect()
-    }
+/// Returns the values of the overrides that a kernel's source declares.
+fn constants(kernel: &Kernel, source: &str, is_balanced: bool) -> Vec<(&'static str, f64)> {
+    let all = [("BALANCED", is_balanced), ("ROWS", kernel.scans_rows)];
+    let declared = all.into_iter().filter(|(name, _)| source.contains(&format!("override {name}")));
+    declared.map(|(name, is_set)| (name, f64::from(u8::from(is_set)))).collect()
 }
 
 /// A device with its pipelines, shared by finders.
@@ -49,10 +33,10 @@ pub(super) struct GpuDevice {
     pub(super) is_software: bool,
     pub(super) has_timestamps: bool,
     pub(super) buffers_made: AtomicU32,
-    pipelines: Mutex<HashMap<(&'static str, Variant), wgpu::ComputePipeline>>,
-    is_lost: AtomicBool,
-    /// A call of a page is in progress.
-    #[cfg(target_arch = "wasm32")]
+    /// Kernels that give the rows of a large cell equally many pairs, or do not.
+    pub(super) pipelines: Mutex<HashMap<(KernelId, bool), wgpu::ComputePipeline>>,
+    pub(super) is_lost: AtomicBool,
+    /// A call is in progress.
     pub(super) is_in_call: AtomicBool,
     pub(super) hook: Mutex<Hook>,
 }
@@ -77,7 +61,6 @@ impl GpuDevice {
             buffers_made: AtomicU32::new(0),
             pipelines: Mutex::default(),
             is_lost: AtomicBool::new(false),
-            #[cfg(target_arch = "wasm32")]
             is_in_call: AtomicBool::new(false),
             hook: Mutex::new(Box::new(|_| ())),
         })
@@ -122,30 +105,25 @@ impl GpuDevice {
 
     /// Compiles all kernels.
     pub(super) fn compile_all(&self, options: &GpuOptions) {
-        let variant = Variant::new(options);
-        for kernel in KERNELS {
-            self.pipeline(kernel, variant);
-        }
-        for kernel in [&SCAN_BLOCKS, &SCAN_SUMS] {
-            self.pipeline(kernel, variant.of_rows());
+        for kernel in KERNELS.iter().chain(SCAN_OF_ROWS) {
+            self.pipeline(kernel, options.load_balancing);
         }
     }
 
     /// Returns the pipeline of a kernel, which is compiled at first use.
-    pub(super) fn pipeline(&self, kernel: &'static Kernel, variant: Variant) -> wgpu::ComputePipeline {
+    pub(super) fn pipeline(&self, kernel: &'static Kernel, is_balanced: bool) -> wgpu::ComputePipeline {
         let mut pipelines = lock(&self.pipelines);
-        if let Some(pipeline) = pipelines.get(&(kernel.name, variant)) {
-            return pipeline.clone();
-        }
-        let pipeline = self.compile(kernel, &kernel.source(), variant);
-        pipelines.insert((kernel.name, variant), pipeline.clone());
-        pipeline
+        let compiled = pipelines
+            .entry((id_of(kernel), is_balanced))
+            .or_insert_with(|| self.compile(kernel, is_balanced));
+        compiled.clone()
     }
 
-    fn compile(&self, kernel: &Kernel, source: &str, variant: Variant) -> wgpu::ComputePipeline {
+    fn compile(&self, kernel: &Kernel, is_balanced: bool) -> wgpu::ComputePipeline {
+        let source = &kernel.source();
         let module = self.handle.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(kernel.name),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
+            source: wgpu::ShaderSource::Wgsl(source.as_str().into()),
         });
         self.handle.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(kernel.name),
@@ -153,22 +131,12 @@ impl GpuDevice {
             module: &module,
             entry_point: Some(kernel.name),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &variant.constants(source),
+                constants: &constants(kernel, source, is_balanced),
                 // Lane 0 would zero everything, which is slow. Kernels zero what they read.
                 zero_initialize_workgroup_memory: false,
             },
             cache: None,
         })
-    }
-
-    /// Forgets all pipelines: one may be what was refused.
-    pub(super) fn forget_pipelines(&self) {
-        lock(&self.pipelines).clear();
-    }
-
-    /// Returns the number of pipelines.
-    pub(super) fn pipelines(&self) -> usize {
-        lock(&self.pipelines).len()
     }
 
     pub(super) fn buffer(
@@ -189,10 +157,6 @@ impl GpuDevice {
 
     pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
         self.queue.submit([encoder.finish()])
-    }
-
-    pub(super) fn take_back(&self) {
-        self.is_lost.store(false, Ordering::Relaxed);
     }
 
     /// Marks the device as lost, because its state is unknown.

@@ -6,7 +6,6 @@ use crate::GpuOptions;
 use crate::layout::{Counters, LANES, MAX_LEVELS, MAX_SPAN};
 use crate::pbig::Summary;
 use crate::policy::most_tests;
-use pbig_core::Aabb;
 
 /// Factor by which the number of boxes, or the work for a box, may change until a plan is outgrown.
 const OUTGROWN: u64 = 2;
@@ -34,13 +33,8 @@ pub(super) struct KeptPlan {
 }
 
 impl KeptPlan {
-    /// Plans for boxes, with a factor on the cells, on a device with buffers of at most this size.
-    pub(super) fn new(boxes: &[Aabb], (options, cell_factor): (&GpuOptions, f32), max_bytes: u64) -> Self {
-        Self::of(&Summary::of(boxes), boxes.len() as u32, (options, cell_factor), max_bytes)
-    }
-
-    /// Plans as [`KeptPlan::new`], for this number of boxes that were measured.
-    pub(super) fn of(
+    /// Plans for this number of boxes, with a factor on the cells, on a device with buffers of at most this size.
+    pub(super) fn new(
         summary: &Summary,
         boxes: u32,
         (options, cell_factor): (&GpuOptions, f32),
@@ -80,7 +74,13 @@ impl KeptPlan {
         // The last level has one cell.
         let of_a_box = 1 + CELLS_OF_A_BOX[..self.plan.levels.len() - 1].iter().sum::<u64>();
         let entries = u64::from(boxes) * of_a_box;
-        if entries > u32::MAX.into() { Err(GpuError::TooManyEntries { boxes, entries }) } else { Ok(()) }
+        if entries <= u32::MAX.into() {
+            return Ok(());
+        }
+        let most = u32::MAX;
+        Err(GpuError::Declined(format!(
+            "{boxes} boxes may have {entries} entries in cells, but the device counts up to {most}"
+        )))
     }
 
     /// Notes a call. Returns true if the work for a box has doubled or halved since the first one.
@@ -96,10 +96,11 @@ impl KeptPlan {
 mod tests {
     use super::*;
     use crate::layout::Level;
+    use pbig_core::Aabb;
 
     fn kept(boxes: usize) -> KeptPlan {
         let cubes: Vec<_> = (0..boxes).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.5; 3])).collect();
-        KeptPlan::new(&cubes, (&GpuOptions::DEFAULT, 1.0), 1 << 23)
+        KeptPlan::new(&Summary::of(&cubes), boxes as u32, (&GpuOptions::DEFAULT, 1.0), 1 << 23)
     }
 
     fn counted(valid: u32, entries: u32, tests: u32) -> Counters {

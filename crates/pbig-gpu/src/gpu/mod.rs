@@ -8,7 +8,6 @@ mod error;
 mod forecast;
 mod gpu_device;
 mod gpu_plan;
-mod items;
 mod kept_plan;
 mod levels;
 mod passes;
@@ -26,7 +25,6 @@ mod wait;
 mod watch;
 
 pub use adapter::describe;
-use error::Failure;
 pub use error::{DECLINED, GpuError};
 use gpu_plan::GpuPlan;
 pub use resident::{DeviceBoxes, DevicePairs};
@@ -39,6 +37,7 @@ use pbig_core::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 use resident::Resident;
 use session::Session;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// Returns all adapters, best first: discrete, integrated, virtual, unknown, software.
@@ -192,7 +191,7 @@ impl GpuFinder {
         request: &SearchRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
-        self.run(request, found).await.map_err(Failure::for_core)
+        self.run(request, found).await.map_err(GpuError::for_core)
     }
 
     /// Records a search of boxes that live on the device, and whose pairs stay there. Submits nothing, waits for nothing, and, where
@@ -243,8 +242,7 @@ impl GpuFinder {
         let kept = self.resident.take().filter(|kept| kept.suits(device, &self.options));
         let mut resident = kept.unwrap_or_else(|| Resident::new(device, &self.options));
         let result = device.watch_now(|| resident.record(encoder, boxes));
-        use GpuError::{Argument, TooLarge, TooManyEntries};
-        if matches!(result, Ok(_) | Err(Argument(_) | TooLarge { .. } | TooManyEntries { .. })) {
+        if matches!(result, Ok(_) | Err(GpuError::Argument(_) | GpuError::Declined(_))) {
             self.resident = Some(resident);
         }
         result
@@ -258,33 +256,40 @@ impl GpuFinder {
         }
     }
 
-    async fn run(&mut self, request: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
+    async fn run(&mut self, request: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), GpuError> {
         self.check_pause()?;
         let boxes = request.boxes.len();
         if let Some(why) = self.declined.unseen(boxes) {
-            return Err(Failure::Declined(why));
+            return Err(GpuError::Declined(why));
         }
         let result = self.try_run(request, found).await;
         match &result {
-            Err(Failure::Declined(why)) => self.declined.note(boxes, why),
+            // Another call in the page is in progress.
+            Err(GpuError::Busy) => return result,
+            Err(GpuError::Declined(why)) => self.declined.note(boxes, why),
             Ok(()) => self.declined = Declined::default(),
             Err(_) => {}
         }
         self.failed = match &result {
-            // Another call in the page is in progress.
-            Err(Failure::Device(GpuError::Busy)) => self.failed.take(),
-            Err(Failure::Device(error)) => Some((Clock::start(), error.to_string())),
-            _ => None,
+            Ok(()) | Err(GpuError::Declined(_) | GpuError::TooManyPairs) => None,
+            Err(error) => Some((Clock::start(), error.to_string())),
         };
         result
     }
 
-    /// Runs a search in a session that is kept unless the device failed or declined: its state may be wrong then, or too large.
-    async fn try_run(&mut self, request: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
+    /// Runs a search in a session that is kept unless the device failed: its state may be wrong then.
+    async fn try_run(
+        &mut self,
+        request: &SearchRequest<'_>,
+        found: &mut DeviceFound,
+    ) -> Result<(), GpuError> {
         let mut session = self.take_session().await?;
         let (device, pairs) = (session.device.clone(), std::mem::take(&mut found.pairs));
         let result = device.watch(async || session.search(request, pairs).await).await;
-        if matches!(result, Ok(_) | Err(Failure::TooManyPairs | Failure::Device(GpuError::Busy))) {
+        if let Err(GpuError::Declined(_)) = result {
+            session.forecast.forget_lengths(&mut session.storage);
+        }
+        if matches!(result, Ok(_) | Err(GpuError::Declined(_) | GpuError::TooManyPairs | GpuError::Busy)) {
             self.session = Some(session);
         }
         *found = result?;
@@ -321,7 +326,7 @@ impl GpuFinder {
         if let (Source::Given, Some(device)) = (&self.source, &self.device)
             && device.is_idle_within(PROBE)
         {
-            device.take_back();
+            device.is_lost.store(false, Ordering::Relaxed);
             return Ok(device.clone());
         }
         let device = match &self.source {
@@ -339,7 +344,7 @@ impl PairDevice for GpuFinder {
         request: &SearchRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
-        wait::block_on(self.run(request, found)).map_err(Failure::for_core)
+        wait::block_on(self.run(request, found)).map_err(GpuError::for_core)
     }
 
     fn name(&self) -> Option<&str> {

@@ -1,12 +1,11 @@
 //! The kernels and buffers of a search, as tables.
 
 use super::GpuError;
-use super::gpu_device::Variant;
 use super::storage::Storage;
 use super::timer::Timer;
 use crate::layout::{
-    self, CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Chunk, Counters, GROUPS_PER_ROW, LANES, LargeItem,
-    Located, Params, SHORT_ROW, Slot, SmallItem, Totals, WINDOW,
+    self, CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Counters, GROUPS_PER_ROW, LANES, LargeItem, Located,
+    Params, SHORT_ROW, Slot, SmallItem, Totals, WINDOW,
 };
 use pbig_core::Pair;
 use pbig_shaders::{self as shaders, Buffer, Kernel};
@@ -25,8 +24,6 @@ pub(super) enum Step {
     /// Sets the first bytes of a buffer to 0.
     Clear(Buffer, u64),
     Run(&'static Kernel, Groups),
-    /// Runs a kernel of the scan on the rows of pairs instead of the cells.
-    RunOnRows(&'static Kernel, Groups),
 }
 
 /// The step that begins the counts of a check anew.
@@ -34,12 +31,12 @@ pub(super) const CLEAR_TOTALS: Step = Clear(Buffer::Totals, size_of::<Totals>() 
 
 use Buffer::{Dispatches, LongRows};
 use Groups::{Direct, Indirect};
-use Step::{Clear, Run, RunOnRows};
+use Step::{Clear, Run};
 
-/// Returns the steps that turn boxes into work items, without a round trip to the host, and check the first of these.
+/// Returns the steps that turn boxes into work items, without a round trip to the host, and check the first chunk of these.
 pub(super) fn map_and_check(params: &Params) -> Vec<Step> {
     let by_box = Direct(params.boxes.div_ceil(LANES));
-    vec![
+    let map = [
         CLEAR_TOTALS,
         Clear(Buffer::Cells, bytes_of::<Cell>(params.cells)),
         Clear(Buffer::Counters, bytes_of::<Counters>(1)),
@@ -49,6 +46,13 @@ pub(super) fn map_and_check(params: &Params) -> Vec<Step> {
         Run(&shaders::SCAN_SUMS, Direct(1)),
         Run(&shaders::SCHEDULE, Direct(params.cells.div_ceil(CELLS_PER_BLOCK))),
         Run(&shaders::SCATTER, by_box),
+    ];
+    [&map[..], &check()].concat()
+}
+
+/// Returns the steps that check a chunk of the work items, whose number the device knows.
+pub(super) fn check() -> [Step; 3] {
+    [
         Run(&shaders::ARRANGE, Direct(1)),
         Run(&shaders::CHECK_SMALL, Indirect(Dispatches, 0)),
         Run(&shaders::CHECK_LARGE, Indirect(Dispatches, 12)),
@@ -67,13 +71,14 @@ pub(super) fn pair_count(boxes: u32) -> u64 {
 }
 
 /// Returns the steps that group this number of pairs by first box. Their work is a few steps a pair.
-pub(super) fn group(boxes: u32, pairs: u32) -> Vec<Step> {
-    vec![
+pub(super) fn group(boxes: u32, pairs: u32) -> [Step; 6] {
+    let [scan_blocks, scan_sums] = shaders::SCAN_OF_ROWS;
+    [
         Clear(Buffer::Rows, bytes_of::<u32>(boxes)),
         Clear(Buffer::Windows, windows_bytes(boxes, pairs)),
         Run(&shaders::COUNT_PAIRS, by_pair(pairs)),
-        RunOnRows(&shaders::SCAN_BLOCKS, Direct(boxes.div_ceil(COUNTS_PER_BLOCK))),
-        RunOnRows(&shaders::SCAN_SUMS, Direct(1)),
+        Run(scan_blocks, Direct(boxes.div_ceil(COUNTS_PER_BLOCK))),
+        Run(scan_sums, Direct(1)),
         Run(&shaders::PLACE_PAIRS, by_pair(pairs)),
     ]
 }
@@ -93,12 +98,6 @@ pub(super) fn rank(left: u32) -> Vec<Step> {
         [&shaders::PLACE_WINDOWS, &shaders::RANK_WINDOWS].map(|it| Run(it, Indirect(LongRows, 0)));
     let steps = [Run(&shaders::RANK_PAIRS, by_pair(left.min(MOST_RANKED)))].into_iter();
     steps.chain(long_rows.into_iter().filter(|_| left <= MOST_RANKED)).collect()
-}
-
-/// Returns the steps that check a chunk.
-pub(super) fn check(items: &Chunk) -> [Step; 2] {
-    let Chunk { small_items, large_items, .. } = *items;
-    [Run(&shaders::CHECK_SMALL, Direct(small_items)), Run(&shaders::CHECK_LARGE, Direct(large_items))]
 }
 
 fn bytes_of<T>(elements: u32) -> u64 {
@@ -168,11 +167,6 @@ pub(super) fn lists_fit(params: &Params, found: &Counters) -> bool {
         && found.large_items <= params.large_capacity
 }
 
-/// Returns true if nothing has to be repeated with more room or another plan.
-pub(super) fn fits(params: &Params, found: &Counters) -> bool {
-    lists_fit(params, found) && tests_fit(params, found)
-}
-
 /// Returns true if the work items need no more tests than the plan promised.
 pub(super) fn tests_fit(params: &Params, found: &Counters) -> bool {
     found.tests <= params.most_tests && found.too_many_tests == 0
@@ -182,12 +176,10 @@ pub(super) fn tests_fit(params: &Params, found: &Counters) -> bool {
 pub(super) struct Recording<'a> {
     pub(super) storage: &'a mut Storage,
     pub(super) encoder: &'a mut wgpu::CommandEncoder,
-    pub(super) variant: Variant,
+    /// See [`crate::GpuOptions::load_balancing`].
+    pub(super) is_balanced: bool,
     pub(super) timer: Option<&'a mut Timer>,
 }
-
-/// A kernel with its number of workgroups and its choices.
-type Dispatch = (&'static Kernel, Groups, Variant);
 
 impl Recording<'_> {
     /// Records steps: first everything that is cleared, then the kernels. They share a pass, unless each is timed.
@@ -199,8 +191,7 @@ impl Recording<'_> {
                     self.encoder.clear_buffer(self.storage.get(buffer), 0, Some(bytes));
                 }
                 Run(_, Direct(0)) => {}
-                Run(kernel, groups) => kernels.push((kernel, groups, self.variant)),
-                RunOnRows(kernel, groups) => kernels.push((kernel, groups, self.variant.of_rows())),
+                Run(kernel, groups) => kernels.push((kernel, groups)),
             }
         }
         let Some(timer) = self.timer.take() else {
@@ -212,14 +203,18 @@ impl Recording<'_> {
     }
 
     /// Records a pass.
-    fn run(&mut self, kernels: &[Dispatch], timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>) {
+    fn run(
+        &mut self,
+        kernels: &[(&'static Kernel, Groups)],
+        timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>,
+    ) {
         let descriptor = wgpu::ComputePassDescriptor { label: Some("pbig"), timestamp_writes };
         let mut pass = self.encoder.begin_compute_pass(&descriptor);
-        for &(kernel, groups, variant) in kernels {
-            let pipeline = self.storage.device.pipeline(kernel, variant);
+        for &(kernel, groups) in kernels {
+            let pipeline = self.storage.device.pipeline(kernel, self.is_balanced);
             pass.insert_debug_marker(kernel.name);
             pass.set_pipeline(&pipeline);
-            pass.set_bind_group(0, &self.storage.bind_group(kernel, variant, &pipeline), &[]);
+            pass.set_bind_group(0, &self.storage.bind_group(kernel, &pipeline), &[]);
             match groups {
                 Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
                 Indirect(buffer, at) => pass.dispatch_workgroups_indirect(self.storage.get(buffer), at),

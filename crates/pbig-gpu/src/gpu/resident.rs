@@ -5,15 +5,13 @@
 
 use super::GpuError;
 use super::forecast::{Forecast, needs_grid};
-use super::gpu_device::{GpuDevice, Variant};
-use super::kept_plan::{FINER_RETRY, KeptPlan};
+use super::gpu_device::GpuDevice;
+use super::kept_plan::KeptPlan;
 use super::passes::{self, Groups, Recording, Step};
 use super::reports::{Learned, Reports};
 use super::storage::Storage;
 use crate::GpuOptions;
-use crate::layout::{
-    Chunk, Counters, DeviceBox, LANES, PairCount, Params, SUMMARY_WORDS, UNPLANNED, halves, wide,
-};
+use crate::layout::{Chunk, Counters, DeviceBox, LANES, PairCount, Params, SUMMARY_WORDS, UNPLANNED, wide};
 use pbig_core::ProxyFilter;
 use pbig_shaders::{self as shaders, Buffer};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -66,7 +64,7 @@ impl Resident {
             options: *options,
             storage: Storage::new(device.clone(), options),
             reports: Reports::default(),
-            forecast: Forecast::new(),
+            forecast: Forecast::default(),
             plans: 0,
             wants_measure: true,
             uniforms: None,
@@ -91,8 +89,8 @@ impl Resident {
         learned.into_iter().for_each(|learned| self.learn(learned));
         let prepared = self.prepare(boxes);
         if prepared.is_err() {
-            // Lists that exceed a limit say nothing of the next boxes.
-            (self.forecast.lists, self.forecast.words) = Default::default();
+            self.forecast.forget_lengths(&mut self.storage);
+            self.uniforms = None;
         }
         let params = prepared?;
         self.copy_boxes(encoder, boxes);
@@ -139,9 +137,8 @@ impl Resident {
         let forecast = &mut self.forecast;
         forecast.words = if words > 0 { words } else { forecast.words };
         if let Some(summary) = summary {
-            let max_bytes = self.storage.max_buffer_bytes;
-            let made = KeptPlan::of(&summary, boxes, (&self.options, forecast.cell_factor), max_bytes);
-            (forecast.plan, self.plans, self.wants_measure) = (Some(made), self.plans + 1, false);
+            forecast.make_plan(&summary, boxes, &self.options, self.storage.max_buffer_bytes);
+            (self.plans, self.wants_measure) = (self.plans + 1, false);
             return;
         }
         if let Some(kept) = forecast.plan.as_mut().filter(|_| needs_plan) {
@@ -160,7 +157,7 @@ impl Resident {
         let forecast = &mut self.forecast;
         let is_new = forecast.plan.as_ref().is_some_and(KeptPlan::is_new);
         if !self.wants_measure {
-            forecast.cell_factor = if is_new && forecast.cell_factor == 1.0 { FINER_RETRY } else { 1.0 };
+            forecast.is_finer = is_new && !forecast.is_finer;
         }
         self.wants_measure = true;
     }
@@ -185,9 +182,8 @@ impl Resident {
     /// Makes the uniforms of a call, unless they are those of the last one. Commands that are recorded read them later, so they never
     /// change.
     fn set_uniforms(&mut self, params: &Params) -> Result<(), GpuError> {
-        let words = (self.storage.size(Buffer::Out) / 4).min(u64::from(u32::MAX) - 1);
         let all = Chunk { small_items: u32::MAX, large_items: u32::MAX, ..Chunk::default() };
-        let chunk = Chunk { word_capacity: words as u32, pairs_left: halves(u64::MAX), ..all };
+        let chunk = self.storage.with_room(all, u64::MAX);
         if self.uniforms != Some((*params, chunk)) {
             self.storage.replace(Buffer::Params, params)?;
             self.storage.replace(Buffer::Chunk, &chunk)?;
@@ -224,8 +220,8 @@ impl Resident {
             steps.push(Step::Run(&shaders::MEASURE, Groups::Direct(params.boxes.div_ceil(LANES))));
         }
         steps.push(Step::Run(&shaders::CONCLUDE, Groups::Direct(1)));
-        let (storage, variant) = (&mut self.storage, Variant::new(&self.options));
-        Recording { storage, encoder, variant, timer: None }.record(&steps);
+        let (storage, is_balanced) = (&mut self.storage, self.options.load_balancing);
+        Recording { storage, encoder, is_balanced, timer: None }.record(&steps);
     }
 
     /// Returns true if a call measures the boxes.

@@ -2,19 +2,18 @@
 //! are few. Lists that did not fit are made longer, and the search is repeated.
 
 use super::GpuError;
-use super::error::Failure;
 use super::forecast::needs_grid;
-use super::items::{cut, rest};
-use super::kept_plan::{FINER_RETRY, KeptPlan};
 use super::passes::{self, MOST_RANKED, pair_count};
 use super::readback::Counts;
 use super::session::Session;
-use super::storage::Upload;
+use super::storage::BufferId;
 use super::timer::Timer;
 use crate::layout::{Chunk, Counters, LANES, Params, Totals, wide};
+use crate::pbig::Summary;
 use pbig_core::internal::Clock;
 use pbig_core::{Aabb, DeviceFound, Pair, PairList, SearchRequest};
 use pbig_shaders::Buffer;
+use std::ops::Range;
 
 /// Maximum number of repetitions. Each one has the room that the last one asked for.
 const MAX_REPEATS: u32 = 8;
@@ -28,7 +27,7 @@ impl Session {
         &mut self,
         request: &SearchRequest<'_>,
         mut pairs: PairList,
-    ) -> Result<DeviceFound, Failure> {
+    ) -> Result<DeviceFound, GpuError> {
         pairs.clear();
         self.found = DeviceFound::default();
         (self.found.pairs, self.max_pairs, self.submissions) = (pairs, request.max_pairs, 0);
@@ -52,18 +51,17 @@ impl Session {
         let (count, limit) = (request.boxes.len() as u64, self.storage.max_boxes());
         if count > limit {
             let [bytes, limit] = [count, limit].map(|boxes| boxes * size_of::<Aabb>() as u64);
-            return Err(GpuError::TooLarge { what: "boxes", bytes, limit });
+            return Err(GpuError::too_large("boxes", bytes, limit));
         }
-        let boxes = Upload::new(Buffer::Boxes, request.boxes);
-        let filters = Upload::new(Buffer::Filters, request.filters.unwrap_or(&[]));
-        self.found.report.uploaded = self.storage.upload(&[boxes, filters])?;
+        self.found.report.uploaded = self.storage.upload(Buffer::Boxes, request.boxes)?
+            + self.storage.upload(Buffer::Filters, request.filters.unwrap_or(&[]))?;
         self.found.report.upload = clock.lap();
         Ok(())
     }
 
     /// Checks all pairs, again with more room if lists or pairs did not fit. Returns the counts.
-    async fn count(&mut self, request: &SearchRequest<'_>) -> Result<Counts, Failure> {
-        self.forecast.cell_factor = 1.0;
+    async fn count(&mut self, request: &SearchRequest<'_>) -> Result<Counts, GpuError> {
+        self.forecast.is_finer = false;
         // A plan that no search has used was made for the boxes of a call without an answer.
         self.forecast.plan.take_if(|kept| kept.is_new());
         let boxes = request.boxes.len() as u32;
@@ -77,7 +75,7 @@ impl Session {
             }
             self.found.report.repeats += 1;
         }
-        Err(GpuError::Refused("counts that contradict each other".into()).into())
+        Err(GpuError::Refused("counts that contradict each other".into()))
     }
 
     /// Makes a plan if the boxes need one, and there is none or one for many more or fewer boxes.
@@ -86,32 +84,50 @@ impl Session {
         forecast.plan.take_if(|kept| !kept.suits(boxes.len()));
         if forecast.plan.is_none() && needs_grid(&self.options, boxes.len() as u32) {
             let mut clock = Clock::start();
-            let settings = (&self.options, forecast.cell_factor);
-            forecast.plan = Some(KeptPlan::new(boxes, settings, self.storage.max_buffer_bytes));
+            let (summary, max_bytes) = (Summary::of(boxes), self.storage.max_buffer_bytes);
+            forecast.make_plan(&summary, boxes.len() as u32, &self.options, max_bytes);
             self.found.report.plan += clock.lap();
         }
     }
 
-    /// Sorts the boxes into cells, and checks their work items, a chunk in each submission. Returns the counts.
+    /// Sorts the boxes into cells, and checks their work items, a chunk in each submission. Returns the counts. The host learns with
+    /// them how many chunks there are: before, it submits some more than the last call had.
     async fn check(&mut self) -> Result<Counts, GpuError> {
         self.found.report.chunks = 1;
         if self.params.levels == 0 {
             self.submit(Chunk::default(), &passes::check_all(&self.params))?;
             return self.counts().await;
         }
-        let [small_items, large_items] = self.chunk_items();
-        let first = Chunk { small_items, large_items, ..Chunk::default() };
-        self.submit(first, &passes::map_and_check(&self.params))?;
-        let counts = self.counts().await?;
-        let others = cut(rest(&counts.counters, &first), self.chunk_items());
-        if others.is_empty() || !passes::fits(&self.params, &counts.counters) {
-            return Ok(counts);
+        self.submit(self.chunk(0), &passes::map_and_check(&self.params))?;
+        let last = self.chunks(&self.forecast.lists);
+        let submitted = last.saturating_add(last / 4);
+        let counts = self.check_chunks(1..submitted).await?;
+        let (params, counters) = (&self.params, &counts.counters);
+        let chunks = self.chunks(counters);
+        self.found.report.chunks = chunks;
+        let fits = passes::lists_fit(params, counters) && passes::tests_fit(params, counters);
+        if fits && submitted < chunks { self.check_chunks(submitted..chunks).await } else { Ok(counts) }
+    }
+
+    /// Checks chunks of work items. Returns the counts of all so far.
+    async fn check_chunks(&mut self, chunks: Range<u32>) -> Result<Counts, GpuError> {
+        for i in chunks {
+            self.submit(self.chunk(i), &passes::check())?;
         }
-        for chunk in &others {
-            self.submit(*chunk, &passes::check(chunk))?;
-        }
-        self.found.report.chunks += others.len() as u32;
         self.counts().await
+    }
+
+    /// Returns a chunk of the work items.
+    fn chunk(&self, i: u32) -> Chunk {
+        let [small_items, large_items] = self.chunk_items();
+        let [first_small, first_large] = [small_items, large_items].map(|items| i.saturating_mul(items));
+        Chunk { first_small, small_items, first_large, large_items, ..Chunk::default() }
+    }
+
+    /// Returns the number of chunks of work items.
+    fn chunks(&self, lists: &Counters) -> u32 {
+        let [small, large] = self.chunk_items();
+        lists.small_items.div_ceil(small).max(lists.large_items.div_ceil(large)).max(1)
     }
 
     /// Returns the numbers of small and of large work items of a chunk. A software adapter gets fewer, so that it answers in time.
@@ -121,7 +137,7 @@ impl Session {
     }
 
     /// Notes the lengths that a check needed. Returns false if it had less room.
-    fn accepts(&mut self, counts: &Counts) -> Result<bool, Failure> {
+    fn accepts(&mut self, counts: &Counts) -> Result<bool, GpuError> {
         let Counts { counters, totals } = counts;
         if self.params.levels > 0 {
             self.forecast.lists = *counters;
@@ -135,7 +151,7 @@ impl Session {
         }
         let words = wide(totals.words);
         if words / 2 > self.max_pairs {
-            return Err(Failure::TooManyPairs);
+            return Err(GpuError::TooManyPairs);
         }
         self.forecast.words = words;
         Ok(words <= self.storage.size(Buffer::Out) / 4)
@@ -146,22 +162,18 @@ impl Session {
     ///
     /// # Errors
     /// If that is done: the call is declined.
-    fn replan(&mut self) -> Result<(), Failure> {
+    fn replan(&mut self) -> Result<(), GpuError> {
         let forecast = &mut self.forecast;
         let was_new = forecast.plan.take().is_some_and(|kept| kept.is_new());
         let Counters { tests, too_many_tests, .. } = std::mem::take(&mut forecast.lists);
-        if !was_new {
-            return Ok(());
-        }
-        if forecast.cell_factor > FINER_RETRY {
-            forecast.cell_factor = FINER_RETRY;
+        if !was_new || !std::mem::replace(&mut forecast.is_finer, true) {
             return Ok(());
         }
         let Params { boxes, most_tests, .. } = self.params;
         let [tests, most] = [tests, most_tests].map(|tests| u64::from(LANES) * u64::from(tests));
         // The number wraps around beyond 32 bits of workgroups.
         let tests = if too_many_tests > 0 { "over 2^40".to_owned() } else { tests.to_string() };
-        Err(Failure::Declined(format!("{tests} tests of {boxes} boxes are more than {most}")))
+        Err(GpuError::Declined(format!("{tests} tests of {boxes} boxes are more than {most}")))
     }
 
     /// Notes the grid, the tests and the memory of the call.
@@ -195,23 +207,25 @@ impl Session {
     }
 
     /// Takes the pairs of this number of words, in order if the caller wants it and the device can sort so many.
-    async fn take_pairs(&mut self, words: u64, is_sorted: bool) -> Result<(), Failure> {
+    async fn take_pairs(&mut self, words: u64, is_sorted: bool) -> Result<(), GpuError> {
         if words <= self.prefetched.len() as u64 {
             let mut pairs: Vec<Pair> = bytemuck::cast_slice(&self.prefetched[..words as usize]).to_vec();
             pairs.sort_unstable();
             return self.append(&pairs);
         }
+        // First: the sort gets the room that is left.
+        self.make_staging(4 * words)?;
         let is_sorted = is_sorted && self.params.levels > 0 && self.sort(words)?;
         self.read_pairs(words).await?;
         let is_out_of_order = is_sorted && !self.found.pairs.is_in_order();
-        if is_out_of_order { Err(GpuError::BadPairs("out of order".into()).into()) } else { Ok(()) }
+        if is_out_of_order { Err(GpuError::BadPairs("out of order".into())) } else { Ok(()) }
     }
 
     /// Sorts the pairs of this number of words, a part of them in each submission. Returns false if there is no room for that.
     fn sort(&mut self, words: u64) -> Result<bool, GpuError> {
         let pairs = u32::try_from(words / 2).unwrap_or(u32::MAX);
         match passes::make_sort_buffers(&mut self.storage, self.params.boxes, pairs) {
-            Err(GpuError::TooLarge { .. } | GpuError::OverBudget { .. }) => return Ok(false),
+            Err(GpuError::Declined(_)) => return Ok(false),
             made => made?,
         }
         self.submit(Chunk::default(), &passes::group(self.params.boxes, pairs))?;
@@ -224,10 +238,23 @@ impl Session {
         Ok(true)
     }
 
-    /// Reads pairs of this number of words. With pipelining a piece comes while the one before is taken.
-    async fn read_pairs(&mut self, words: u64) -> Result<(), Failure> {
+    /// Returns the most bytes of pairs that come at a time.
+    fn piece_bytes(&self) -> u64 {
         let most = if self.options.pipelining { PIECE_BYTES } else { u64::MAX };
-        let piece = self.storage.max_buffer_bytes.min(most) / 8 * 8;
+        self.storage.max_buffer_bytes.min(most) / 8 * 8
+    }
+
+    /// Makes the buffers through which pairs of this number of bytes come.
+    fn make_staging(&mut self, bytes: u64) -> Result<(), GpuError> {
+        let piece = self.piece_bytes();
+        self.storage.ensure(BufferId::Staging(0), bytes.min(piece))?;
+        let second = bytes.saturating_sub(piece).min(piece);
+        if second > 0 { self.storage.ensure(BufferId::Staging(1), second) } else { Ok(()) }
+    }
+
+    /// Reads pairs of this number of words. With pipelining a piece comes while the one before is taken.
+    async fn read_pairs(&mut self, words: u64) -> Result<(), GpuError> {
+        let piece = self.piece_bytes();
         let mut next = Some(self.fetch_pairs(0..(4 * words).min(piece), 0)?);
         let mut from = piece;
         while let Some(fetch) = next {
@@ -242,7 +269,7 @@ impl Session {
     }
 
     /// Copies pairs, and checks them on the way: the output of a device is untrusted input. Threads share the work.
-    fn append(&mut self, pairs: &[Pair]) -> Result<(), Failure> {
+    fn append(&mut self, pairs: &[Pair]) -> Result<(), GpuError> {
         let mut clock = Clock::start();
         let boxes = self.params.boxes;
         let fault = |i| GpuError::BadPairs(format!("pair {i} of a piece is not a < b < {boxes}"));

@@ -1,14 +1,14 @@
 //! The state of a finder on a device, and what goes there and comes back.
 
 use super::forecast::Forecast;
-use super::gpu_device::{GpuDevice, Variant};
+use super::gpu_device::GpuDevice;
 use super::passes::{Recording, Step};
 use super::readback::{Counts, Fetch, Mapped};
 use super::storage::{BufferId, Storage};
 use super::timer::Timer;
 use super::{GpuError, wait};
 use crate::GpuOptions;
-use crate::layout::{Chunk, Params, halves};
+use crate::layout::{Chunk, Params};
 use pbig_core::DeviceFound;
 use pbig_core::internal::Clock;
 use pbig_shaders::{Buffer, Stage};
@@ -44,7 +44,7 @@ impl Session {
             options: *options,
             storage: Storage::new(device.clone(), options),
             timer: Timer::new(&device, options),
-            forecast: Forecast::new(),
+            forecast: Forecast::default(),
             params: Params::default(),
             max_pairs: 0,
             found: DeviceFound::default(),
@@ -57,13 +57,13 @@ impl Session {
     /// Records and submits kernels that check these work items. Beyond the limits they count, and write no more.
     pub(super) fn submit(&mut self, items: Chunk, steps: &[Step]) -> Result<(), GpuError> {
         let mut clock = Clock::start();
-        let words = (self.storage.size(Buffer::Out) / 4).min(u64::from(u32::MAX) - 1);
-        let chunk = Chunk { word_capacity: words as u32, pairs_left: halves(self.max_pairs), ..items };
+        let chunk = self.storage.with_room(items, self.max_pairs);
         self.storage.write(Buffer::Params, &[self.params])?;
         self.storage.write(Buffer::Chunk, &[chunk])?;
         let mut encoder = self.device.encoder();
-        let (storage, variant, timer) = (&mut self.storage, Variant::new(&self.options), self.timer.as_mut());
-        Recording { storage, encoder: &mut encoder, variant, timer }.record(steps);
+        let Self { storage, options, timer, .. } = self;
+        let (is_balanced, timer) = (options.load_balancing, timer.as_mut());
+        Recording { storage, encoder: &mut encoder, is_balanced, timer }.record(steps);
         self.device.submit(encoder);
         self.submissions += 1;
         self.found.report.record += clock.lap();

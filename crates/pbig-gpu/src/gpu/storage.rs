@@ -2,9 +2,9 @@
 //! are hardly used. Each list goes up through a staging buffer, which stays mapped between calls: threads write it there once.
 
 use super::GpuError;
-use super::gpu_device::{GpuDevice, Variant};
+use super::gpu_device::{GpuDevice, KernelId, id_of};
 use crate::GpuOptions;
-use crate::layout::{BOX_BITS, DeviceBox};
+use crate::layout::{BOX_BITS, Chunk, DeviceBox, halves};
 use bytemuck::Pod;
 use pbig_core::internal::{self as parallel, threads_for};
 use pbig_shaders::{Buffer, Kernel};
@@ -70,22 +70,6 @@ impl BufferId {
     }
 }
 
-/// A list for a buffer of the device.
-pub(super) struct Upload<'a> {
-    buffer: Buffer,
-    bytes: &'a [u8],
-}
-
-impl<'a> Upload<'a> {
-    pub(super) fn new<T: Pod>(buffer: Buffer, list: &'a [T]) -> Self {
-        Self { buffer, bytes: bytemuck::cast_slice(list) }
-    }
-
-    fn len(&self) -> u64 {
-        self.bytes.len() as u64
-    }
-}
-
 #[derive(Debug)]
 struct KeptBuffer {
     buffer: wgpu::Buffer,
@@ -105,7 +89,7 @@ pub(super) struct Storage {
     max_total_bytes: u64,
     buffers: HashMap<BufferId, KeptBuffer>,
     /// Bind groups of the present buffers.
-    bind_groups: HashMap<(&'static str, Variant), wgpu::BindGroup>,
+    bind_groups: HashMap<KernelId, wgpu::BindGroup>,
     calls: u32,
 }
 
@@ -130,7 +114,7 @@ impl Storage {
     pub(super) fn ensure(&mut self, id: impl Into<BufferId>, bytes: u64) -> Result<(), GpuError> {
         let (id, limit) = (id.into(), self.max_buffer_bytes);
         if bytes > limit {
-            return Err(GpuError::TooLarge { what: id.name(), bytes, limit });
+            return Err(GpuError::too_large(id.name(), bytes, limit));
         }
         let bytes = bytes.max(MIN_BUFFER_BYTES);
         if let Some(kept) = self.buffers.get_mut(&id).filter(|kept| kept.buffer.size() >= bytes) {
@@ -152,8 +136,13 @@ impl Storage {
 
     /// Returns an error if a buffer of this size would exceed the limit of all together.
     fn check_total(&self, id: BufferId, size: u64) -> Result<(), GpuError> {
-        let (bytes, limit) = (self.bytes() + size, self.max_total_bytes);
-        if bytes > limit { Err(GpuError::OverBudget { what: id.name(), bytes, limit }) } else { Ok(()) }
+        let (bytes, limit, what) = (self.bytes() + size, self.max_total_bytes, id.name());
+        if bytes <= limit {
+            return Ok(());
+        }
+        Err(GpuError::Declined(format!(
+            "with the buffer {what} the device's buffers need {bytes} bytes, but GpuOptions::max_total_bytes allows {limit}"
+        )))
     }
 
     /// Returns a buffer that [`Storage::ensure`] has made.
@@ -164,6 +153,19 @@ impl Storage {
     /// Returns the size of a buffer in bytes, or 0 if there is none.
     pub(super) fn size(&self, id: impl Into<BufferId>) -> u64 {
         self.buffers.get(&id.into()).map_or(0, |kept| kept.buffer.size())
+    }
+
+    /// Returns a range of work with the room for its pairs, of which a call may have this number.
+    pub(super) fn with_room(&self, items: Chunk, max_pairs: u64) -> Chunk {
+        // A list of 2^32 - 1 words would have no place for the mark of none.
+        let words = (self.size(Buffer::Out) / 4).min(u64::from(u32::MAX) - 1);
+        Chunk { word_capacity: words as u32, pairs_left: halves(max_pairs), ..items }
+    }
+
+    /// Frees all buffers.
+    pub(super) fn free(&mut self) {
+        self.buffers.clear();
+        self.bind_groups.clear();
     }
 
     pub(super) fn bytes(&self) -> u64 {
@@ -191,32 +193,32 @@ impl Storage {
         Ok(())
     }
 
-    /// Makes the buffers of lists, and sends the lists. Returns their bytes.
-    pub(super) fn upload(&mut self, uploads: &[Upload<'_>]) -> Result<u64, GpuError> {
-        let mut encoder = self.device.encoder();
-        for upload in uploads {
-            // Kernels bind it even if it is empty.
-            self.ensure(upload.buffer, upload.len())?;
-            if upload.len() > 0 {
-                let staging = self.stage(upload)?;
-                encoder.copy_buffer_to_buffer(&staging, 0, self.get(upload.buffer), 0, upload.len());
-            }
+    /// Makes the buffer of a list, and sends the list. Returns its bytes.
+    pub(super) fn upload<T: Pod>(&mut self, buffer: Buffer, list: &[T]) -> Result<u64, GpuError> {
+        let list: &[u8] = bytemuck::cast_slice(list);
+        let bytes = list.len() as u64;
+        // Kernels bind it even if it is empty.
+        self.ensure(buffer, bytes)?;
+        if bytes > 0 {
+            let staging = self.stage(buffer, list)?;
+            let mut encoder = self.device.encoder();
+            encoder.copy_buffer_to_buffer(&staging, 0, self.get(buffer), 0, bytes);
+            self.device.submit(encoder);
+            self.take_staging_back(buffer);
         }
-        self.device.submit(encoder);
-        uploads.iter().filter(|upload| upload.len() > 0).for_each(|upload| self.take_staging_back(upload));
-        Ok(uploads.iter().map(Upload::len).sum())
+        Ok(bytes)
     }
 
     /// Writes a list into its staging buffer: each thread writes pieces of it straight into mapped memory.
-    fn stage(&mut self, upload: &Upload<'_>) -> Result<wgpu::Buffer, GpuError> {
-        let id = BufferId::UploadStaging(upload.buffer);
+    fn stage(&mut self, buffer: Buffer, list: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+        let id = BufferId::UploadStaging(buffer);
         // A call that failed has left the buffer to the device.
         if self.buffers.get(&id).is_some_and(|kept| !kept.is_mapped.load(Ordering::Acquire)) {
             self.buffers.remove(&id);
         }
-        self.ensure(id, upload.len())?;
+        self.ensure(id, list.len() as u64)?;
         let kept = &self.buffers[&id];
-        let pieces: Vec<&[u8]> = upload.bytes.chunks(PIECE_BYTES).collect();
+        let pieces: Vec<&[u8]> = list.chunks(PIECE_BYTES).collect();
         let has_failed = AtomicBool::new(false);
         parallel::run(threads_for(pieces.len()), pieces.len(), |_, i| {
             let (from, piece) = ((i * PIECE_BYTES) as u64, pieces[i]);
@@ -234,8 +236,8 @@ impl Storage {
     }
 
     /// Asks for the staging buffer of a list back once the device has made its copy: a later wait maps it.
-    fn take_staging_back(&self, upload: &Upload<'_>) {
-        let kept = &self.buffers[&BufferId::UploadStaging(upload.buffer)];
+    fn take_staging_back(&self, buffer: Buffer) {
+        let kept = &self.buffers[&BufferId::UploadStaging(buffer)];
         let is_mapped = kept.is_mapped.clone();
         kept.buffer.map_async(wgpu::MapMode::Write, .., move |result| {
             is_mapped.store(result.is_ok(), Ordering::Release);
@@ -245,22 +247,20 @@ impl Storage {
     pub(super) fn bind_group(
         &mut self,
         kernel: &'static Kernel,
-        variant: Variant,
         pipeline: &wgpu::ComputePipeline,
     ) -> wgpu::BindGroup {
-        let key = (kernel.name, variant);
-        if let Some(known) = self.bind_groups.get(&key) {
+        if let Some(known) = self.bind_groups.get(&id_of(kernel)) {
             return known.clone();
         }
         let entry = |(binding, &buffer): (u32, &Buffer)| wgpu::BindGroupEntry {
             binding,
-            resource: self.get(variant.bound(buffer)).as_entire_binding(),
+            resource: self.get(buffer).as_entire_binding(),
         };
         let entries: Vec<_> = (0..).zip(kernel.bindings).map(entry).collect();
         let layout = &pipeline.get_bind_group_layout(0);
         let descriptor = wgpu::BindGroupDescriptor { label: Some(kernel.name), layout, entries: &entries };
         let made = self.device.handle.create_bind_group(&descriptor);
-        self.bind_groups.insert(key, made.clone());
+        self.bind_groups.insert(id_of(kernel), made.clone());
         made
     }
 

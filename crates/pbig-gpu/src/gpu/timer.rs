@@ -5,8 +5,8 @@ use crate::GpuOptions;
 use pbig_shaders::Kernel;
 use std::time::Duration;
 
-/// Maximum number of kernels of a call that are timed. Each takes two timestamps.
-const MOST_TIMED: u32 = 64;
+/// Maximum number of kernels of a call that are timed: each takes two timestamps, and no query set of WebGPU holds more.
+const MOST_TIMED: u32 = wgpu::QUERY_SET_MAX_QUERIES / 2;
 
 /// A query set, and the kernels that it has timed in this call.
 #[derive(Debug)]

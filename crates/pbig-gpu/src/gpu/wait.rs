@@ -7,16 +7,8 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 /// Blocks until a future is done.
-pub(super) fn block_on<T, E: From<GpuError>>(future: impl Future<Output = Result<T, E>>) -> Result<T, E> {
+pub(super) fn block_on<T>(future: impl Future<Output = Result<T, GpuError>>) -> Result<T, GpuError> {
     pollster::block_on(future)
-}
-
-/// A call in progress.
-pub(super) struct Entered;
-
-/// Begins a call. Threads may share a device at any time: each has its own error scopes.
-pub(super) fn enter(_: &GpuDevice) -> Result<Entered, GpuError> {
-    Ok(Entered)
 }
 
 /// Waits for a submission, and maps the first `bytes` of the staging buffer that it has filled.

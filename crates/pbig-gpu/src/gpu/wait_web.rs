@@ -3,29 +3,13 @@
 use super::GpuError;
 use super::gpu_device::{GpuDevice, lock};
 use std::future::poll_fn;
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::task::{Poll, Waker};
 use std::time::Duration;
 
 /// Returns an error: a page may not block.
-pub(super) fn block_on<T, E: From<GpuError>>(_: impl Future<Output = Result<T, E>>) -> Result<T, E> {
-    Err(GpuError::WouldBlock.into())
-}
-
-/// A call in progress.
-pub(super) struct Entered<'a>(&'a GpuDevice);
-
-impl Drop for Entered<'_> {
-    fn drop(&mut self) {
-        self.0.is_in_call.store(false, Ordering::Relaxed);
-    }
-}
-
-/// Begins a call. The calls of a page share one stack of error scopes, so a second one has to wait.
-pub(super) fn enter(device: &GpuDevice) -> Result<Entered<'_>, GpuError> {
-    let is_free = !device.is_in_call.swap(true, Ordering::Relaxed);
-    is_free.then_some(Entered(device)).ok_or(GpuError::Busy)
+pub(super) fn block_on<T>(_: impl Future<Output = Result<T, GpuError>>) -> Result<T, GpuError> {
+    Err(GpuError::WouldBlock)
 }
 
 /// The result of a mapping, and the task that waits for it.

@@ -1,16 +1,33 @@
 //! Errors that wgpu reports while a call is in progress.
 
-use super::gpu_device::GpuDevice;
-use super::{GpuError, wait};
+use super::GpuError;
+use super::gpu_device::{GpuDevice, lock};
+use std::sync::atomic::Ordering;
+
+/// A call in progress.
+struct Entered<'a>(&'a GpuDevice);
+
+impl Drop for Entered<'_> {
+    fn drop(&mut self) {
+        self.0.is_in_call.store(false, Ordering::Relaxed);
+    }
+}
 
 impl GpuDevice {
+    /// Begins a call. The calls of a page share one stack of error scopes, so a second one has to wait. Each thread of a program has its
+    /// own.
+    fn enter(&self) -> Result<Entered<'_>, GpuError> {
+        let is_busy = self.is_in_call.swap(true, Ordering::Relaxed);
+        if is_busy && cfg!(target_arch = "wasm32") { Err(GpuError::Busy) } else { Ok(Entered(self)) }
+    }
+
     /// Runs `work`, and returns errors that wgpu reports meanwhile.
-    pub(super) async fn watch<T, F: From<GpuError>>(
+    pub(super) async fn watch<T>(
         &self,
-        work: impl AsyncFnOnce() -> Result<T, F>,
-    ) -> Result<T, F> {
+        work: impl AsyncFnOnce() -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
         use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
-        let _entered = wait::enter(self)?;
+        let _entered = self.enter()?;
         // Three variables, because a future that is dropped must end the innermost scope first.
         let outer = self.handle.push_error_scope(Validation);
         let middle = self.handle.push_error_scope(OutOfMemory);
@@ -23,19 +40,20 @@ impl GpuDevice {
             first = first.or(error.await);
         }
         let Some(error) = first else { return result };
-        self.forget_pipelines();
+        // One may be what was refused.
+        lock(&self.pipelines).clear();
         match error {
-            wgpu::Error::OutOfMemory { .. } => Err(GpuError::OutOfMemory.into()),
+            wgpu::Error::OutOfMemory { .. } => Err(GpuError::OutOfMemory),
             // A lost device refuses everything, and its messages do not name the loss.
-            _ if !self.is_alive() => Err(self.give_up().into()),
-            other => Err(GpuError::Refused(first_lines(&other.to_string())).into()),
+            _ if !self.is_alive() => Err(self.give_up()),
+            other => Err(GpuError::Refused(first_lines(&other.to_string()))),
         }
     }
 
     /// Runs `work`, and returns errors that wgpu reports meanwhile.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn watch_now<T>(&self, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
-        wait::block_on(self.watch(async || work()))
+        super::wait::block_on(self.watch(async || work()))
     }
 
     /// Runs `work`. The page is told of errors, and cannot wait for them.
