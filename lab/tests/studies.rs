@@ -64,7 +64,7 @@ fn steady_has_every_motion() {
 #[test]
 fn papers_have_every_table_and_counts_fit_what_is_expected() {
     let report = papers::run(true).expect("all ways agree");
-    assert_eq!(report.tables.len(), 12);
+    assert_eq!(report.tables.len(), 11);
     // A device's tables are empty without one.
     assert!(report.tables.iter().all(|table| !table.rows.is_empty() || table.name.contains("GPU")));
     for name in ["PBIG figure 8", "PBIG figure 11"] {

@@ -98,7 +98,11 @@ impl fmt::Display for Why {
             Self::SameCollider => write!(f, "both handles are the same"),
             Self::Unknown(handle) => write!(f, "collider {:?} is unknown or gone", handle),
             Self::Disabled(handle) => {
-                write!(f, "collider {:?}, or its body, is disabled, by the app or because it was not finite", handle)
+                write!(
+                    f,
+                    "collider {:?}, or its body, is disabled, by the app or because it was not finite",
+                    handle
+                )
             }
             Self::InvalidBox(handle) => {
                 write!(f, "the box of collider {:?} is invalid: a NaN, perhaps", handle)
