@@ -155,7 +155,7 @@ step_rapier_0_36() {
     rm -f "$CARGO_TARGET_DIR/release/bench_step"
     step cargo test --release $in_036 $members_036 $features_036 --no-fail-fast
     # Built for the tests above. `cargo run` would build rapier again, for other features.
-    step "$CARGO_TARGET_DIR/release/bench_step" --scenes column --bodies 500 --steps 60 --chart "$TMPDIR/steps.svg"
+    step "$CARGO_TARGET_DIR/release/bench_step" --scenes column --bodies 500 --steps 60
     step env PBIG_RUNS=100 PBIG_BODIES=80 cargo test --release $in_036 $others_036 --no-fail-fast
     step env RUSTDOCFLAGS="-D warnings" \
         cargo doc --release $in_036 -p rapier3d-pbig --features shadow,debug-render --no-deps

@@ -116,10 +116,12 @@ where
         lost::add_observers(app.world_mut());
         match (self.is_shadow, app.is_plugin_added::<BvhBroadPhasePlugin<H>>()) {
             (false, true) => warn!(
-                "avian's own broad phase runs beside pbig: `.disable::<BvhBroadPhasePlugin>()`, or `<BvhBroadPhasePlugin<MyHooks>>`, saves its time"
+                "avian's own broad phase runs beside pbig: `.disable::<BvhBroadPhasePlugin>()`, or `<BvhBroadPhasePlugin<MyHooks>>`, \
+                 saves its time"
             ),
             (true, false) => warn!(
-                "avian's own broad phase is missing: leave out `.as_shadow()`; or it has other hooks: add `PbigBroadPhasePlugin::<MyHooks>::default().as_shadow()`"
+                "avian's own broad phase is missing: leave out `.as_shadow()`; or it has other hooks: add \
+                 `PbigBroadPhasePlugin::<MyHooks>::default().as_shadow()`"
             ),
             _ => {}
         }

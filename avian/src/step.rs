@@ -77,7 +77,7 @@ where
         if TypeId::of::<H>() == TypeId::of::<()>() {
             warn_once!(
                 "colliders have `ActiveCollisionHooks::FILTER_PAIRS`, but pbig has no hooks, and filters none: \
-                 name them in `PbigBroadPhasePlugin::<MyHooks>::default()` and `.disable::<BvhBroadPhasePlugin<MyHooks>>()`"
+                 name them in `PbigBroadPhasePlugin::<MyHooks>::default()`, and where you disable avian's own"
             );
         }
         self.hooks.filter_pairs(one.collider, other.collider, &mut self.commands)

@@ -58,9 +58,8 @@ fn charts(tables: &[Table], gpu: &str) -> Vec<Chart> {
         line
     };
     let of_steps = [("printed", "printed"), ("pbig, CPU", "ours, CPU"), (gpu, "ours, GPU")];
-    let of_steps = of_steps.map(|(name, side)| {
-        steps.line(name, ["objects", "whole, ms"], |row| row[1] == 1.0 && row[2] == side)
-    });
+    let of_steps =
+        of_steps.map(|(name, side)| steps.line(name, ["objects", "whole, ms"], |row| row[1] == side));
     let of_cells = sizes.into_iter().map(of_size).collect();
     let chart = |name, title, x, lines| Chart::log(name, title, [x, "time, ms"], lines);
     vec![

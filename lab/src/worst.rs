@@ -56,7 +56,7 @@ impl Kind {
 #[derive(Clone, Debug)]
 enum Find {
     World(Recipe),
-    /// Two sets; the first one has a share of the boxes, as one in this number plus one.
+    /// Two sets: the second one has this many times the boxes of the first one.
     Two([Recipe; 2], usize),
     History(History),
 }

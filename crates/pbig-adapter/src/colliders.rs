@@ -154,12 +154,10 @@ impl<T: Tree> Colliders<T> {
         margins: &Margins,
         send: impl FnMut(PairEvent),
     ) {
-        let removed = scene.removed().count();
-        let modified = scene.listed_count();
-        let has_changes = modified + removed > 0 || self.differs_from(scene);
-        let _span = tracing::debug_span!(target: "pbig", "update", modified).entered();
-        let totals = Totals { updates: self.counts.totals.updates + 1, ..self.counts.totals };
-        self.counts = Counts { modified: modified + self.counts.moved, removed, totals, ..Counts::default() };
+        let (listed, removed) = (scene.listed_count(), scene.removed().count());
+        let has_changes = listed + removed > 0 || self.differs_from(scene);
+        self.begin_counts(listed, removed);
+        let _span = tracing::debug_span!(target: "pbig", "update", self.counts.modified).entered();
         (self.last_error, self.is_idle) = (None, false);
         // A shape may panic in the middle.
         self.tree.expire();
@@ -168,6 +166,12 @@ impl<T: Tree> Colliders<T> {
         self.find_and_send(|handle| scene.size(handle), send);
         self.counts.totals.failures += u64::from(self.last_error.is_some());
         self.is_idle = !has_changes && self.has_nothing_left();
+    }
+
+    fn begin_counts(&mut self, listed: usize, removed: usize) {
+        let totals = Totals { updates: self.counts.totals.updates + 1, ..self.counts.totals };
+        let modified = listed + self.counts.moved;
+        self.counts = Counts { modified, removed, totals, ..Counts::default() };
     }
 
     /// Counts an update in which rapier lists nothing, and returns true if there is nothing else to do either.
@@ -179,8 +183,7 @@ impl<T: Tree> Colliders<T> {
             && self.has_no_changes()
             && !self.differs_from(scene);
         if skips {
-            self.counts.modified = std::mem::take(&mut self.counts.moved);
-            self.counts.totals.updates += 1;
+            self.begin_counts(0, 0);
         }
         skips
     }

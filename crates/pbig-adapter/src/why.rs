@@ -100,7 +100,7 @@ impl fmt::Display for Why {
             Self::Disabled(handle) => {
                 write!(
                     f,
-                    "collider {:?}, or its body, is disabled, by the app or because it was not finite",
+                    "collider {:?}, or its body, is disabled, perhaps because it was not finite (rapier 0.36)",
                     handle
                 )
             }

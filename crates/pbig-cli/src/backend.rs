@@ -78,8 +78,8 @@ impl BackendArgs {
         if let (true, Some(why)) = (self.require_gpu, no_gpu(adapter, fallback)) {
             return Err(Failure::Check(format!("--require-gpu: {why}")));
         }
-        match (adapter, fallback) {
-            (Some(name), _) if is_software(name) => warn(&format!(
+        match (adapter.filter(|name| is_software(name)), fallback) {
+            (Some(name), _) => warn(&format!(
                 "{name} is a program on the CPU, slower than --backend cpu; `pbig doctor` says why no GPU is found"
             )),
             (None, Some(why)) => warn(&format!("{}; `pbig doctor` says more", plain(why))),

@@ -100,13 +100,13 @@ fn advice(candidates: &[Candidate]) -> Option<String> {
     Some(format!("no GPU is found: {}{INSTALL}", causes.map(|cause| cause + "; ").collect::<String>()))
 }
 
-/// The API of this system for which pbig's kernels are compiled first.
-const API: &str = if cfg!(windows) {
-    "dx12"
+/// The API of this system's GPUs.
+const API: (wgpu::Backends, &str) = if cfg!(windows) {
+    (wgpu::Backends::DX12, "dx12")
 } else if cfg!(target_vendor = "apple") {
-    "metal"
+    (wgpu::Backends::METAL, "metal")
 } else {
-    "vulkan"
+    (wgpu::Backends::VULKAN, "vulkan")
 };
 
 const INSTALL: &str = "install its driver with Vulkan (NVIDIA: the vendor's; AMD and Intel: mesa-vulkan-drivers on Debian and Ubuntu) and \
@@ -115,17 +115,17 @@ const INSTALL: &str = "install its driver with Vulkan (NVIDIA: the vendor's; AMD
 
 fn wrong_api() -> Option<String> {
     let api = std::env::var("WGPU_BACKEND").ok()?;
-    let has_own = api.to_lowercase().contains(API);
-    (!has_own).then(|| format!("WGPU_BACKEND={api:?} leaves out {API}: unset it"))
+    let (own, name) = API;
+    let has_own = wgpu::Backends::from_comma_list(&api).contains(own);
+    (!has_own).then(|| format!("WGPU_BACKEND={api:?} leaves out {name}: unset it"))
 }
 
-/// Returns what is wrong with the variables that name Vulkan's drivers.
+/// Returns what is wrong with the variable that names Vulkan's drivers. The first one counts.
 fn missing_driver() -> Option<String> {
-    ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].into_iter().find_map(|variable| {
-        let files = std::env::var_os(variable)?;
-        let missing = std::env::split_paths(&files).find(|file| !file.exists())?;
-        Some(format!("{variable} names {}, which does not exist: unset it", missing.display()))
-    })
+    let variables = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].map(|name| (name, std::env::var_os(name)));
+    let (variable, files) = variables.into_iter().find_map(|(name, files)| Some((name, files?)))?;
+    let missing = std::env::split_paths(&files).find(|file| !file.exists())?;
+    Some(format!("{variable} names {}, which does not exist: unset it", missing.display()))
 }
 
 /// Returns all that the text says, as JSON.

@@ -39,8 +39,8 @@ pub struct GpuOptions {
     /// If true, the device counts the tests that it makes, those that repeat another and those of boxes that are apart. It
     /// costs four more atomic operations for each workgroup.
     pub count_tests: bool,
-    /// If true, the device measures the time of each kernel, the first 2048 of a call, where it can. It then finishes one before the next begins, and
-    /// recording takes the host twice as long.
+    /// If true, the device measures the time of each kernel, the first 2048 of a call, where it can. It then finishes one before the
+    /// next begins, and recording takes the host twice as long.
     pub time_kernels: bool,
 }
 

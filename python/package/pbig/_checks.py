@@ -91,10 +91,13 @@ def kinds(text: str) -> list[str]:
 
 def _array(name: str, values: ArrayLike, *columns: int) -> NDArray[Any]:
     """Returns an array. An empty list has the columns that it should have."""
+    ragged = ValueError(f"{name} has rows of different lengths; give as many numbers in each")
     try:
         array = np.asarray(values)
     except ValueError:
-        raise ValueError(f"{name} has rows of different lengths; give as many numbers in each") from None
+        raise ragged from None
+    if array.dtype.kind == "O" and array.ndim == 1 and array.size > 0:
+        raise ragged
     if array.ndim == 0 and array.dtype.kind in "OUS":
         raise TypeError(f"{name} has the type {type(values).__name__}; give an array of numbers")
     return array.reshape(0, *columns) if array.shape == (0,) else array

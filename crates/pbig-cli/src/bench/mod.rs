@@ -39,7 +39,7 @@ enum Suite {
     Steady,
     /// The experiments of PBIG's and Avril's papers, the printed figures beside ours (of `pbig-studies`).
     Papers,
-    /// The GPU pipeline: upload, each kernel, readback, decode, whole call.
+    /// Whole calls on the best adapter beside the CPU, and their parts: upload, each kernel, readback.
     Gpu,
 }
 

@@ -270,8 +270,10 @@ pub(super) fn drop_false<'a>(
     for (span, a) in rows {
         let start = (span.start - base) as usize;
         let row = &mut others[start..start + span.len as usize];
-        let is_known = |b: u32| known.contains(a) && known.contains(b);
-        if !row.is_sorted_by(|one, next| one < next) || !row.iter().all(|b| is_known(*b)) {
+        let is_known = |b: u32| known.contains(b);
+        if !known.contains(a) {
+            span.len = 0;
+        } else if !row.is_sorted_by(|one, next| one < next) || !row.iter().all(|b| is_known(*b)) {
             row.sort_unstable();
             span.len = keep_known(row, is_known) as u32;
         }

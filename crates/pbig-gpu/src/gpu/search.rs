@@ -81,7 +81,10 @@ impl Session {
     /// Makes a plan if the boxes need one, and there is none or one for many more or fewer boxes.
     fn plan(&mut self, boxes: &[Aabb]) {
         let forecast = &mut self.forecast;
-        forecast.plan.take_if(|kept| !kept.suits(boxes.len()));
+        if forecast.plan.take_if(|kept| !kept.suits(boxes.len())).is_some() {
+            // The next call may have far fewer chunks.
+            forecast.lists = Counters::default();
+        }
         if forecast.plan.is_none() && needs_grid(&self.options, boxes.len() as u32) {
             let mut clock = Clock::start();
             let (summary, max_bytes) = (Summary::of(boxes), self.storage.max_buffer_bytes);
