@@ -273,16 +273,28 @@ type Plant = fn(&mut State);
 /// A comparison that never finds a fault would pass every test above.
 #[test]
 fn planted_faults_are_noticed() {
-    // For the comparison of plain buffers, and for each of its own.
-    let faults: [(&str, Plant); 10] = [
+    let faults: [(&str, Plant); 23] = [
+        ("measure", |s| s.summary.iter_mut().rev().take(3).for_each(|word| *word ^= 1)),
         ("measure", |s| *s.summary.iter_mut().find(|word| **word > 0).expect("a class") += 1),
         ("conclude", |s| s.pair_count.status ^= 1),
+        ("locate", |s| s.located[7].shape ^= 1 << (SPAN_BITS + 3)),
+        ("locate", |s| full(s).residents -= 1),
+        ("locate", |s| s.counters.valid -= 1),
+        ("visit", |s| full(s).visitors += 1),
+        ("scan_blocks", |s| *s.sums.last_mut().expect("a block") += 1),
+        ("scan_blocks", |s| full(s).visitors += 1),
+        ("scan_sums", |s| s.sums[0] += 1),
+        ("scan_sums", |s| s.counters.entries -= 1),
         ("schedule", |s| s.slots[1].first_pair += 1),
+        ("schedule", |s| s.small_items[1].slot -= 1),
         ("schedule", |s| s.small_items[1].pairs -= 1),
         ("schedule", |s| s.large_items.truncate(s.large_items.len() - 1)),
         ("scatter", |s| s.entries[5] ^= 1 << AXIS_BITS),
-        ("scatter", |s| s.cells[0].residents += 1),
+        ("scatter", |s| s.entries[5] += 1),
+        ("arrange", |s| s.dispatches[3] += 1),
         ("check_small", drop_a_pair),
+        ("check_large", drop_a_pair),
+        ("check_all", drop_a_pair),
         ("check_small", |s| s.totals.redundant[0] ^= 1),
         ("index_pairs", |s| s.out[4] ^= 1),
     ];
@@ -294,6 +306,11 @@ fn planted_faults_are_noticed() {
         plant(&mut found);
         assert!(twin(kernel).compare(&before, &found, &wanted).is_some(), "fault {i}, {kernel}");
     }
+}
+
+/// Returns a cell with residents.
+fn full(s: &mut State) -> &mut Cell {
+    s.cells.iter_mut().find(|cell| cell.residents > 0).expect("a cell with residents")
 }
 
 /// Removes a pair from the list, but not from the counts.

@@ -4,6 +4,7 @@
 mod extremes;
 mod fuzzed;
 mod motion;
+mod multitudes;
 mod shapes;
 mod soak;
 

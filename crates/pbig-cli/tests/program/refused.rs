@@ -1,6 +1,6 @@
 //! Files that cannot be read: what the one line on stderr says was found, where, and what to do.
 
-use super::{array, pbig, refused, save};
+use super::{array, json, pbig, read_pairs, refused, save};
 use ndarray::{Array2, Array3};
 use pbig_core::Aabb;
 #[cfg(target_os = "linux")]
@@ -53,7 +53,7 @@ fn header(kind: &str, shape: &str) -> Vec<u8> {
 }
 
 /// The parser of headers understands more than numpy writes, and checks all that it understands. A header that promises more than
-/// the file holds is refused before anything is allocated, and so are values that are no floats.
+/// the file holds is refused before anything is allocated, and values that are no floats are named as numpy names them.
 #[test]
 fn a_header_cannot_lie_and_says_what_the_values_are() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -68,7 +68,7 @@ fn a_header_cannot_lie_and_says_what_the_values_are() {
         ("replay", header_of(&quoted("(0, 0x4000000000000000, 6)")), "larger than any file"),
         ("replay", header_of(&quoted("(20000000, 0, 6)")), "too many empty frames"),
         ("pairs", header_of(&nested), "none that numpy writes"),
-        ("pairs", header_of(&quoted("(0x20000000000, 6)").replace("f4", "f0")), "values are of type '<f0'"),
+        ("pairs", header_of(&quoted("(0x20000000000, 6)").replace("f4", "f0")), "values are float0"),
         ("pairs", floats("1000000000000, 6"), "24000000000000 bytes"),
         ("pairs", floats("10, 6"), "needs 240 bytes"),
         ("pairs", floats("4611686018427387904, 6"), "larger than any file"),
@@ -78,9 +78,13 @@ fn a_header_cannot_lie_and_says_what_the_values_are() {
         (
             "pairs",
             others("'<i4'", 4),
-            "values are of type '<i4'; expected float32 or float64 (numpy: `.astype('float32')`)",
+            "values are int32; expected float32 or float64 (numpy: `.astype('float32')`)",
         ),
-        ("pairs", others("'<f2'", 2), "values are of type '<f2'; expected"),
+        ("pairs", others("'>u8'", 8), "values are uint64; expected"),
+        ("pairs", others("'|b1'", 1), "values are bool; expected"),
+        ("pairs", others("'<f2'", 2), "values are float16; expected"),
+        ("pairs", others("'<c8'", 8), "values are complex64; expected"),
+        ("pairs", others("'<U1'", 4), "values are of type '<U1'; expected"),
         ("pairs", others("[('a', '<f4')]", 4), "values are records; expected"),
     ] {
         let line = line_about(folder.path(), command, "x.npy", &content);
@@ -142,6 +146,19 @@ fn long_values_are_cut_in_errors_and_the_expected_form_stays() {
 }
 
 #[test]
+fn a_list_of_frames_and_one_of_boxes_are_told_apart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let refuse = |command, words: &str| refused(&pbig(folder.path(), &[command, "x.npy"]), &[words]);
+    save(folder.path(), "x.npy", &Array3::<f64>::zeros((4, 3, 6)));
+    refuse("pairs", "shape (4, 3, 6) is a list of frames: use `pbig replay`; `pbig pairs` expects (N, 6)");
+    save(folder.path(), "x.npy", &Array2::<f32>::zeros((4, 6)));
+    refuse("replay", "shape (4, 6) is one list of boxes: use `pbig pairs`; `pbig replay` expects (F, N, 6)");
+    save(folder.path(), "x.npy", &Array3::<f32>::zeros((6, 4, 3)));
+    refuse("pairs", "expected an array of shape (N, 6), found (6, 4, 3)");
+    refuse("replay", "expected an array of shape (F, N, 6), found (6, 4, 3)");
+}
+
+#[test]
 fn other_separators_or_headers_are_told_what_is_expected() {
     let folder = tempfile::tempdir().expect("a folder");
     let header = "the header must be min_x,min_y,min_z,max_x,max_y,max_z, or be left out";
@@ -165,4 +182,20 @@ fn other_separators_or_headers_are_told_what_is_expected() {
     }
     let line = line_about(folder.path(), "pairs", "x.csv", b"0,0,0,1,1,1\n\n0,0,0,1,1,\xff\n");
     assert_eq!(line, "pbig: x.csv: line 3: this is not UTF-8; save the file as UTF-8 text");
+}
+
+#[test]
+fn endings_in_capitals_are_the_same_endings() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    save(here, "A.NPY", &Array2::<f32>::zeros((2, 6)));
+    std::fs::write(here.join("B.CSV"), "0,0,0,1,1,1\n0,0,0,1,1,1\n").expect("written");
+    for input in ["A.NPY", "B.CSV"] {
+        json(&pbig(here, &["pairs", input, "-o", "OUT.Npy", "--json"]));
+        assert_eq!(read_pairs(&here.join("OUT.Npy")).len(), 1, "{input}");
+    }
+    json(&pbig(here, &["pairs", "A.NPY", "-o", "OUT.CSV", "--json"]));
+    assert_eq!(std::fs::read_to_string(here.join("OUT.CSV")).expect("the output"), "a,b\n0,1\n");
+    save(here, "F.NPY", &Array3::<f32>::zeros((1, 2, 6)));
+    json(&pbig(here, &["replay", "F.NPY", "-o", "EVENTS.CSV", "--json"]));
 }

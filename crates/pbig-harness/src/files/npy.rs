@@ -178,9 +178,28 @@ fn unreadable(error: &impl std::fmt::Display) -> String {
     one_line(format!("not a readable .npy file: {}", brief(&error.to_string())))
 }
 
+/// Marks of the order of bytes.
+const ORDERS: [char; 4] = ['<', '>', '=', '|'];
+
 fn values_text(kind: Option<&String>) -> String {
-    let found = kind.map_or("records".into(), |kind| format!("of type '{}'", brief(kind)));
+    let found = kind.map_or("records".into(), |kind| value_name(kind));
     one_line(format!("values are {found}; expected float32 or float64 (numpy: `.astype('float32')`)"))
+}
+
+/// Returns numpy's name of the values that a header describes as, say, `<i4`.
+fn value_name(kind: &str) -> String {
+    let plain = kind.trim_start_matches(ORDERS);
+    let (letter, bytes) = plain.split_at_checked(1).unwrap_or((plain, ""));
+    let named = |name: &str| bytes.parse::<u8>().map(|bytes| format!("{name}{}", 8 * u32::from(bytes))).ok();
+    let name = match letter {
+        "b" => Some("bool".to_string()),
+        "i" => named("int"),
+        "u" => named("uint"),
+        "f" => named("float"),
+        "c" => named("complex"),
+        _ => None,
+    };
+    name.unwrap_or_else(|| format!("of type '{}'", brief(kind)))
 }
 
 /// Reads the magic bytes, the version, the length of the header and the header, and stops at the first of them that is wrong.
@@ -281,7 +300,7 @@ mod tests {
         assert_eq!((endless(b"", None).as_str(), endless(b"\x93NUMPX", None).as_str()), (no_npy, no_npy));
         assert_eq!(endless(b"\x93NUMPY\x03\x00\xff\xff\xff\xff", None), NOT_NUMPYS);
         for (start, words) in [
-            (head("<i4", "False", "9, 6"), "values are of type '<i4'"),
+            (head("<i4", "False", "9, 6"), "values are int32"),
             (head("<f4", "False", "9, 5"), "found (9, 5)"),
             (head("<f4", "False", "9, 8, 6"), "use `pbig replay`"),
             (head("<f4", "False", "134217729, 6"), "134217729 boxes are more than 134217728; for more"),
@@ -289,8 +308,6 @@ mod tests {
             let what = endless(&start, None);
             assert!(what.contains(words), "{what}");
         }
-        let list = npy_frames(&head("<f4", "False", "0, 6")).expect_err("one list");
-        assert!(list.starts_with("shape (0, 6) is one list of boxes: use `pbig pairs`; "), "{list}");
         let start = head("<f4", "False", "9, 6");
         let what = endless(&start, Some(start.len() as u64 + 217));
         assert_eq!(what, "shape (9, 6) needs 216 bytes of values, the file has 217");
