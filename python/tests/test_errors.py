@@ -96,7 +96,16 @@ def test_a_warning_says_what_and_where_and_points_at_the_caller(changes, words):
 def test_sound_and_empty_meshes_are_silent(recwarn):
     assert all(len(pairs) == 0 for pairs in mesh(faces=[])().values())
     assert all(len(pairs) == 0 for pairs in mesh(vertices=[], faces=[], margin=np.array(0.5))().values())
-    assert len(pbig.pairs([])) == 0 and not recwarn.list
+    assert len(pbig.pairs([])) == 0 and len(pbig.edges(np.zeros((0, 3), "U3"))) == 0 and not recwarn.list
+
+
+def test_an_error_of_the_callers_own_array_stays():
+    class Lazy:
+        def __array__(self, *_, **__):
+            raise ValueError("not a dataset")
+
+    with pytest.raises(ValueError, match="not a dataset"):
+        pbig.pairs(Lazy())
 
 
 def test_more_boxes_than_there_can_be_are_refused_before_they_are_copied():

@@ -165,7 +165,8 @@ impl<T: Tree> Colliders<T> {
         self.tree.note(self.boxes.changes(&self.core).iter().copied(), self.registry.len());
         self.find_and_send(|handle| scene.size(handle), send);
         self.counts.totals.failures += u64::from(self.last_error.is_some());
-        self.is_idle = !has_changes && self.has_nothing_left();
+        // The report of a skipped update is that of the last one: it has to say that nothing changed.
+        self.is_idle = !has_changes && self.core.report().changed == 0 && self.has_nothing_left();
     }
 
     fn begin_counts(&mut self, listed: usize, removed: usize) {

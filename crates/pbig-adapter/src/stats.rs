@@ -11,7 +11,8 @@ use pbig_core::Report;
 pub struct Stats<'a> {
     /// Known colliders, disabled ones included.
     pub colliders: usize,
-    /// Colliders that rapier listed as modified, and boxes that the step before moved: in rapier 0.36 these are not listed.
+    /// Colliders that rapier listed as modified, and boxes that the step before moved: in rapier 0.36 these are not listed. One that
+    /// did both counts twice.
     pub modified: usize,
     /// Colliders that rapier listed as removed or disabled.
     pub removed: usize,

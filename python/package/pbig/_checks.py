@@ -34,7 +34,8 @@ def vertices(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise _wrong_shape(name, array, "(n, 3), with the xyz of a vertex in a row")
     _check_rows(name, array)
     _float_type(name, array)
-    places = np.require(array, np.float64, ["C", "A"])
+    with np.errstate(invalid="ignore"):
+        places = np.require(array, np.float64, ["C", "A"])
     if not (places.max(initial=0) <= LARGEST and places.min(initial=0) >= -LARGEST):
         _warn(name, np.isnan(places).any(axis=1), "with a NaN", "elements there pair with nothing")
         _warn(name, (np.abs(places) > LARGEST).any(axis=1), "beyond float32", "boxes there are infinite")
@@ -94,8 +95,8 @@ def _array(name: str, values: ArrayLike, *columns: int) -> NDArray[Any]:
     ragged = ValueError(f"{name} has rows of different lengths; give as many numbers in each")
     try:
         array = np.asarray(values)
-    except ValueError:
-        raise ragged from None
+    except ValueError as error:
+        raise ragged if "inhomogeneous" in str(error) else error from None
     if array.dtype.kind == "O" and array.ndim == 1 and array.size > 0:
         raise ragged
     if array.ndim == 0 and array.dtype.kind in "OUS":
@@ -112,8 +113,10 @@ def _warn(name: str, are_odd: NDArray[np.bool_], what: str, result: str) -> None
 
 
 def _indices(name: str, array: NDArray[Any], what: str, limit: int) -> NDArray[Any]:
-    # Numpy makes floats of an empty list.
-    if array.dtype.kind not in "iu" and array.size > 0:
+    if array.size == 0:
+        # Of any type: numpy makes floats of an empty list.
+        return np.zeros(array.shape, np.uint32)
+    if array.dtype.kind not in "iu":
         raise TypeError(f"{name} has values of the type {array.dtype}; give whole numbers, such as int64")
     wrong = np.argwhere((array < 0) | (array >= limit))
     if len(wrong) > 0:

@@ -146,3 +146,23 @@ fn a_step_is_one_update_and_one_more_for_each_further_substep() {
     world.step();
     assert!(updates(&world) > Some(3), "{:?}", updates(&world));
 }
+
+/// Most steps move no box out of its margin.
+#[test]
+fn counts_of_a_step_are_its_own() {
+    let mut world = weightless(rapier_pbig::broad_phase());
+    for (x, speed) in [(0.0, 0.3), (1.25, -0.3)] {
+        let body = dynamic(x * Vec3::X).linvel(to_vector(speed * Vec3::X));
+        world.insert(body, ColliderBuilder::new(cuboid(Vec3::splat(0.5))));
+    }
+    let (mut added, mut within) = (0, 0);
+    for _ in 0..40 {
+        world.step();
+        let stats = finder(&world.broad_phase).expect("it is installed").stats();
+        added += stats.added as u64;
+        within += usize::from(stats.modified == 2 && stats.report.changed == 0);
+    }
+    let stats = finder(&world.broad_phase).expect("it is installed").stats();
+    assert_eq!((added, stats.totals.added), (1, 1));
+    assert!(within > 5, "{within} steps");
+}
