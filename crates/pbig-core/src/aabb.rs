@@ -122,6 +122,13 @@ fn round_down(x: f64) -> f32 {
     if f64::from(nearest) > x { nearest.next_down() } else { nearest }
 }
 
+/// Returns an integer in the order of the numbers that are not NaN.
+pub(crate) fn ordered(x: f32) -> u32 {
+    // Without a sign of zero, because -0 and 0 are one number.
+    let bits = (x + 0.0).to_bits();
+    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -72,8 +72,6 @@ pub struct BroadPhase {
     device: DeviceSlot,
     world: World,
     given_up: policy::GivenUp,
-    /// Many boxes that came or jumped got places in the tree.
-    jumped: policy::GivenUp,
     /// The algorithm of the last update with changes.
     last: Algorithm,
     look_up: Scratch<LookUp>,

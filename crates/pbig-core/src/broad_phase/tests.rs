@@ -146,6 +146,7 @@ fn many_boxes_set_on_threads_are_those_set_one_by_one() {
             let mut changes = [many.changes().to_vec(), single.changes().to_vec()];
             changes.iter_mut().for_each(|changes| changes.sort_unstable());
             assert_eq!(changes[0], changes[1], "round {round}");
+            assert_eq!(many.world.arrived, single.world.arrived, "round {round}");
             assert_eq!(many.update(), single.update(), "round {round}");
             assert_eq!(many.report().invalid, single.report().invalid, "round {round}");
         }
@@ -171,6 +172,27 @@ fn many_boxes_set_on_threads_are_those_set_one_by_one() {
     let far = broad_phase.set_many(&ids, |id| place(id, 0));
     assert!(matches!(far, Err(crate::Error::TooManyBoxes { .. })), "{far:?}");
     assert!(broad_phase.len() > 18_000, "the others are set");
+}
+
+/// Each update alone tells: no jump is tried to be looked up, and the first update after jumps is.
+#[test]
+fn boxes_that_jump_are_searched_and_those_that_move_are_looked_up() {
+    let (n, mut random) = (3000, StdRng::seed_from_u64(4));
+    let mut broad_phase = BroadPhase::default();
+    let mut centers = vec![[0.0f32; 3]; n];
+    for update in 0..60 {
+        let (is_first, jumps) = (update == 0, update < 30);
+        for id in (0..n as u32).filter(|id| is_first || (id + update).is_multiple_of(20)) {
+            let center = &mut centers[id as usize];
+            *center =
+                if jumps { [0; 3].map(|_| random.random_range(0.0..20.0)) } else { center.map(|x| x + 0.3) };
+            broad_phase.set(id, Aabb::from_center(*center, [0.5; 3]), ProxyFilter::ALL).expect("room");
+        }
+        broad_phase.update().expect("few pairs");
+        let is_look_up = broad_phase.report().plan.algorithm == Algorithm::LookUp;
+        assert!(is_look_up != jumps, "update {update}");
+    }
+    assert!(broad_phase.pairs().eq(oracle::pairs(broad_phase.fat_aabbs())));
 }
 
 /// A burst of boxes that come, then one change an update: the boxes of the burst get places once.

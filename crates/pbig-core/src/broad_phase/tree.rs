@@ -2,8 +2,8 @@
 //! look-ups and queries it costs next to nothing.
 
 use super::world::World;
+use crate::BoxIndex;
 use crate::parallel::alone;
-use crate::{Aabb, BoxIndex};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
@@ -95,16 +95,6 @@ impl Tree {
     #[cold]
     fn refreshed(&self, world: &World) -> Fresh {
         self.stale.lock().unwrap_or_else(PoisonError::into_inner).refreshed(world, false).0
-    }
-
-    /// Returns how many of the changed boxes need new places in the tree. If it does not know what has changed, all are read anyway.
-    pub(super) fn arrivals(&mut self, boxes: &[Aabb], changed: &[u32]) -> usize {
-        let Stale { index, knows_changes, .. } = self.stale.get_mut().unwrap_or_else(PoisonError::into_inner);
-        match self.fresh.get_mut() {
-            Some(_) => 0,
-            None if *knows_changes => index.arrivals(boxes, changed),
-            None => 0,
-        }
     }
 
     /// Makes the tree fresh, for look-ups of the changed boxes. Returns it, and how many boxes were read.

@@ -37,6 +37,8 @@ pub(crate) struct World {
     /// Ids whose box was set and not removed, valid or not.
     pub(super) present: IdSet,
     pub(super) valid: u32,
+    /// Boxes that came or jumped since the last update; one that did so again counts again.
+    pub(super) arrived: u32,
     /// Boxes that were ever given a filter other than [`ProxyFilter::ALL`].
     pub(super) is_filtered: bool,
     /// A clone makes its own when it needs one.
@@ -79,8 +81,8 @@ impl World {
 
     #[inline(always)]
     fn all(&mut self) -> Part<'_> {
-        let Self { boxes, filters, states, changed, valid, is_filtered, .. } = self;
-        Part { first: 0, boxes, filters, states, changed, valid, is_filtered, is_noted: false }
+        let Self { boxes, filters, states, changed, valid, arrived, is_filtered, .. } = self;
+        Part { first: 0, boxes, filters, states, changed, valid, arrived, is_filtered, is_noted: false }
     }
 
     /// Does something with all boxes. The tree learns if one changes.
@@ -132,10 +134,19 @@ impl World {
         let parts = ids.chunks(PIECE).zip(&mut moved).zip(boxes.zip(filters.zip(states)));
         let done = catch_unwind(AssertUnwindSafe(|| {
             run_parts(threads_for(pieces), parts, |_, ((ids, moved), (boxes, (filters, states)))| {
-                let Moved { changed, valid, is_filtered, is_noted, absent } = moved;
+                let Moved { changed, valid, arrived, is_filtered, is_noted, absent } = moved;
                 let first = ids[0];
-                let mut part =
-                    Part { first, boxes, filters, states, changed, valid, is_filtered, is_noted: false };
+                let mut part = Part {
+                    first,
+                    boxes,
+                    filters,
+                    states,
+                    changed,
+                    valid,
+                    arrived,
+                    is_filtered,
+                    is_noted: false,
+                };
                 for &id in ids {
                     if let Some((aabb, filter)) = of(id)
                         && !part.set(id, aabb, filter, margin)
@@ -153,13 +164,14 @@ impl World {
 
     fn take_moved(&mut self, moved: Vec<Moved>) -> Vec<(u32, Aabb, ProxyFilter)> {
         let mut all_absent = Vec::new();
-        for Moved { changed, valid, is_filtered, is_noted, absent } in moved {
+        for Moved { changed, valid, arrived, is_filtered, is_noted, absent } in moved {
             // A box that has changed before is not listed again.
             if is_noted {
                 self.tree.expire();
             }
             self.changed.extend(changed);
             self.valid = self.valid.wrapping_add(valid);
+            self.arrived = self.arrived.saturating_add(arrived);
             self.is_filtered |= is_filtered;
             all_absent.extend(absent);
         }
@@ -210,6 +222,7 @@ impl World {
         }
         self.changed.clear();
         self.removed.clear();
+        self.arrived = 0;
     }
 
     /// Drops known ids behind the last one that is present, and spare memory.
@@ -234,6 +247,7 @@ struct Moved {
     changed: Vec<u32>,
     /// Valid boxes that there are more, modulo 2^32.
     valid: u32,
+    arrived: u32,
     is_filtered: bool,
     /// A box has changed.
     is_noted: bool,
@@ -248,6 +262,7 @@ struct Part<'a> {
     states: &'a mut [u8],
     changed: &'a mut Vec<u32>,
     valid: &'a mut u32,
+    arrived: &'a mut u32,
     is_filtered: &'a mut bool,
     /// A box has changed.
     is_noted: bool,
@@ -304,7 +319,9 @@ impl Part<'_> {
     #[inline(always)]
     fn put(&mut self, i: usize, aabb: Aabb, margin: f32) {
         let is_valid = aabb.is_valid();
-        let was_valid = !self.boxes[i].min[0].is_nan();
+        let was = &self.boxes[i];
+        let was_valid = !was.min[0].is_nan();
+        *self.arrived = self.arrived.saturating_add(u32::from(is_valid && !is_near(was, &aabb)));
         self.boxes[i] = if is_valid { aabb.inflated(margin) } else { Aabb::NOWHERE };
         *self.valid = self.valid.wrapping_add(u32::from(is_valid)).wrapping_sub(u32::from(was_valid));
     }
@@ -318,6 +335,17 @@ impl Part<'_> {
             self.changed.push(id);
         }
     }
+}
+
+/// Returns true if a box is at most its own length away from where it was, on each axis. Any other box has come or jumped, and needs
+/// another place in a tree.
+#[inline(always)]
+fn is_near(was: &Aabb, is: &Aabb) -> bool {
+    let on_axis = |k: usize| {
+        let reach = was.max[k] - was.min[k];
+        (is.min[k] - was.max[k] <= reach) & (was.min[k] - is.max[k] <= reach)
+    };
+    on_axis(0) & on_axis(1) & on_axis(2)
 }
 
 /// Returns the maximum gap between a stored box and a box that it still holds: twice the margin. A box that shrinks more is stored

@@ -58,7 +58,7 @@ pub struct BoxIndex {
     parents: Vec<u32>,
     /// By node: the box around its boxes.
     pub(crate) bounds: Vec<Aabb>,
-    /// By node: free lanes of a leaf; 1 for any other.
+    /// By node: free lanes of a leaf; for any other, children that have room.
     room: Vec<u8>,
     /// The leaf whose lane was left last.
     left: usize,
@@ -142,9 +142,10 @@ impl BoxIndex {
         walk::overlapping(simd, self, aabb, visit)
     }
 
-    /// Counts nodes that look-ups have looked at. A search after them took as long as some more.
+    /// Counts nodes that look-ups have looked at. If they were given up, a sort pays if the order is bad.
     pub(crate) fn note_look_ups(&mut self, nodes: u64, is_given_up: bool) {
-        self.looked_up += nodes + if is_given_up { policy::bvh::nodes_of_search(self.listed) } else { 0 };
+        self.looked_up +=
+            nodes + if is_given_up { policy::bvh::nodes_for_sort(self.leaves, self.listed) } else { 0 };
     }
 
     /// Counts nodes that a query has looked at, where they can lead to a sort. Threads may lose each other's counts: an atomic addition

@@ -55,12 +55,19 @@ impl Node {
         aabb
     }
 
-    /// Returns by how much the sum of the extents in a lane grows with a box.
+    /// Returns by how much the sum of the extents in each lane grows with a valid box.
     #[inline(always)]
-    pub(crate) fn growth(&self, lane: usize, aabb: &Aabb) -> f32 {
-        let below = |k: usize| (self.boxes[k][lane] - aabb.min[k]).max(0.0);
-        let above = |k: usize| (aabb.max[k] - self.boxes[k + 3][lane]).max(0.0);
-        (0..3).map(|k| below(k) + above(k)).sum()
+    pub(crate) fn growths(&self, _: impl Simd, aabb: &Aabb) -> Lanes {
+        let mut growths = [0.0; LANES];
+        for k in 0..3 {
+            for lane in 0..LANES {
+                let (below, above) =
+                    (self.boxes[k][lane] - aabb.min[k], aabb.max[k] - self.boxes[k + 3][lane]);
+                growths[lane] +=
+                    (if below > 0.0 { below } else { 0.0 }) + if above > 0.0 { above } else { 0.0 };
+            }
+        }
+        growths
     }
 
     #[inline(always)]

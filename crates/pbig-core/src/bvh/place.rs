@@ -5,51 +5,71 @@ use super::node::{LANES, NONE, Node, extent_sum};
 use super::refit::word;
 use crate::Aabb;
 use crate::policy;
-use crate::simd::dispatch;
+use crate::simd::{Simd, dispatch};
 
 /// Children of the root below which a leaf with room is looked for. Parts for boxes of other sizes may lie in the same place.
 const TRIES: usize = 3;
 
 impl BoxIndex {
-    /// Returns how many of some boxes came or have jumped: these need new places.
-    pub(crate) fn arrivals(&self, boxes: &[Aabb], ids: &[u32]) -> usize {
-        let place = |id: u32| self.places.get(id as usize).copied().unwrap_or(NONE);
-        let aabb = |id: u32| boxes.get(id as usize).filter(|aabb| aabb.is_valid());
-        let has_arrived = |id: &&u32| aabb(**id).is_some_and(|aabb| !self.is_near(place(**id), aabb));
-        if self.end > 0 { ids.iter().filter(has_arrived).count() } else { 0 }
-    }
-
     /// Reads few boxes. Those that came, and those that have jumped, get places near others.
     pub(super) fn place(&mut self, boxes: &[Aabb], ids: &[u32]) {
         let mut order = std::mem::take(&mut self.order);
         order.clear();
+        dispatch!(Self::find_places, self, boxes, ids, &mut order);
+        order.sort_unstable();
+        dispatch!(Self::put_all, self, boxes, &order);
+        self.order = order;
+    }
+
+    /// Finds new places for those boxes that need them. Appends all places that have changed, and the ids there.
+    #[inline(always)]
+    fn find_places(simd: impl Simd, index: &mut Self, boxes: &[Aabb], ids: &[u32], order: &mut Vec<u64>) {
         for &id in ids {
-            let place = self.places.get(id as usize).copied().unwrap_or(NONE);
+            let place = index.places.get(id as usize).copied().unwrap_or(NONE);
             let aabb = boxes.get(id as usize).filter(|aabb| aabb.is_valid());
-            let stays = aabb.is_some_and(|aabb| self.is_near(place, aabb));
+            let stays = aabb.is_some_and(|aabb| index.is_near(place, aabb));
             if place != NONE && !stays {
-                self.leave(place);
-                self.places[id as usize] = NONE;
+                index.leave(place);
+                index.places[id as usize] = NONE;
                 order.push(word(place, NONE));
             }
             if let Some(aabb) = aabb {
                 if !stays {
-                    self.add(id, aabb);
+                    index.add(simd, id, aabb);
                 }
-                order.push(word(self.places[id as usize], id));
+                order.push(word(index.places[id as usize], id));
             }
         }
-        order.sort_unstable();
-        dispatch!(Self::put_all, self, boxes, &order);
-        self.order = order;
     }
 
     /// Frees a lane. Its box is still there.
     fn leave(&mut self, place: u32) {
         let leaf = place as usize / LANES;
         self.nodes[leaf].children[place as usize % LANES] = NONE;
-        self.room[leaf] += 1;
         self.left = leaf;
+        self.gain_room(leaf);
+    }
+
+    /// Counts a lane with room more in a node, and in those above it that had none.
+    fn gain_room(&mut self, mut node: usize) {
+        loop {
+            self.room[node] += 1;
+            if self.room[node] > 1 || self.parents[node] == NONE {
+                return;
+            }
+            node = self.parents[node] as usize / LANES;
+        }
+    }
+
+    /// Counts a lane with room less in a node, and in those above it that have none now.
+    fn lose_room(&mut self, mut node: usize) {
+        loop {
+            self.room[node] -= 1;
+            if self.room[node] > 0 || self.parents[node] == NONE {
+                return;
+            }
+            node = self.parents[node] as usize / LANES;
+        }
     }
 
     /// Returns true if a box is still near the place that it has: it meets the bounds of the node above its leaf.
@@ -62,11 +82,12 @@ impl BoxIndex {
     }
 
     /// Gives a box a place near others, or in the loose leaves.
-    fn add(&mut self, id: u32, aabb: &Aabb) {
+    #[inline(always)]
+    fn add(&mut self, simd: impl Simd, id: u32, aabb: &Aabb) {
         if self.places.len() <= id as usize {
             self.places.resize(id as usize + 1, NONE);
         }
-        if let Some(leaf) = self.leaf_with_room(aabb) {
+        if let Some(leaf) = self.leaf_with_room(simd, aabb) {
             return self.put(leaf, id, aabb);
         }
         let last = self.nodes.len().checked_sub(1).filter(|last| *last >= self.end as usize);
@@ -74,7 +95,7 @@ impl BoxIndex {
             |leaf: &usize| *leaf >= self.end as usize && self.room.get(*leaf).is_some_and(|room| *room > 0);
         let open = Some(self.left).filter(is_open).or(last.filter(is_open));
         let at = open.unwrap_or_else(|| {
-            self.push(Node::EMPTY);
+            self.push(Node::EMPTY, LANES as u8);
             self.nodes.len() - 1
         });
         self.put(at, id, aabb);
@@ -87,12 +108,13 @@ impl BoxIndex {
         let lane = node.children.iter().position(|child| *child == NONE).expect("the leaf has room");
         node.children[lane] = id;
         node.set(lane, aabb);
-        self.room[leaf] -= 1;
         self.places[id as usize] = (leaf * LANES + lane) as u32;
+        self.lose_room(leaf);
     }
 
     /// Returns a leaf with a free lane that grows little with a box: below some children of the root that grow least.
-    fn leaf_with_room(&self, aabb: &Aabb) -> Option<usize> {
+    #[inline(always)]
+    fn leaf_with_room(&self, simd: impl Simd, aabb: &Aabb) -> Option<usize> {
         let root = self.root()?;
         if self.is_leaf(root) {
             return (self.room[root as usize] > 0).then_some(root as usize);
@@ -100,34 +122,36 @@ impl BoxIndex {
         let node = &self.nodes[root as usize];
         let mut tried = 0;
         (0..TRIES).find_map(|_| {
-            let lane = self.least_growing(node, aabb, tried)?;
+            let lane = self.least_growing(simd, node, aabb, tried)?;
             tried |= 1 << lane;
-            self.leaf_below(root as usize, lane, aabb)
+            self.leaf_below(simd, root as usize, lane, aabb)
         })
     }
 
-    /// Returns the lane of a node whose child grows least with a box, of those that may have room and were not tried.
-    fn least_growing(&self, node: &Node, aabb: &Aabb, tried: u32) -> Option<usize> {
+    /// Returns the lane of a node whose child grows least with a box, of those that have room and were not tried.
+    #[inline(always)]
+    fn least_growing(&self, simd: impl Simd, node: &Node, aabb: &Aabb, tried: u32) -> Option<usize> {
         let (mut best, mut least) = (None, f32::INFINITY);
+        let growths = node.growths(simd, aabb);
         for lane in (0..LANES).filter(|lane| node.children[*lane] != NONE && tried >> lane & 1 == 0) {
-            let growth = node.growth(lane, aabb);
-            if self.room[node.children[lane] as usize] > 0 && growth < least {
-                (best, least) = (Some(lane), growth);
+            if growths[lane] < least && self.room[node.children[lane] as usize] > 0 {
+                (best, least) = (Some(lane), growths[lane]);
             }
         }
         best
     }
 
-    /// Returns the leaf with room below a child of a node: always the child that grows least. There is none if all there are full, or if
-    /// the leaf would become larger than twice the node above it.
-    fn leaf_below(&self, node: usize, lane: usize, aabb: &Aabb) -> Option<usize> {
+    /// Returns the leaf with room below a child of a node: always the child that grows least. There is none if the leaf would become larger
+    /// than twice the node above it.
+    #[inline(always)]
+    fn leaf_below(&self, simd: impl Simd, node: usize, lane: usize, aabb: &Aabb) -> Option<usize> {
         let (mut above, mut at) = (node, self.nodes[node].children[lane] as usize);
         while !self.is_leaf(at as u32) {
-            let lane = self.least_growing(&self.nodes[at], aabb, 0)?;
+            let lane = self.least_growing(simd, &self.nodes[at], aabb, 0)?;
             (above, at) = (at, self.nodes[at].children[lane] as usize);
         }
         let extent = extent_sum(&self.bounds[at].union(aabb));
         let is_small = extent <= policy::bvh::GROWN_TO * extent_sum(&self.bounds[above]);
-        (is_small && self.room[at] > 0).then_some(at)
+        is_small.then_some(at)
     }
 }

@@ -207,8 +207,8 @@ impl BoxIndex {
         self.grown += grown.map(usize::from).sum::<usize>();
     }
 
-    pub(super) fn push(&mut self, node: Node) {
-        self.room.push(node.children.iter().map(|child| u8::from(*child == NONE)).sum());
+    pub(super) fn push(&mut self, node: Node, room: u8) {
+        self.room.push(room);
         self.nodes.push(node);
         self.parents.push(NONE);
         self.bounds.push(Aabb::NOWHERE);
@@ -261,7 +261,7 @@ impl BoxIndex {
                 node.children[lane] = entry.id;
                 self.places[entry.id as usize] = (self.nodes.len() * LANES + lane) as u32;
             }
-            self.push(node);
+            self.push(node, (LANES - boxes.len()) as u8);
         }
         first..self.nodes.len() as u32
     }
@@ -276,9 +276,8 @@ impl BoxIndex {
                 for (lane, child) in eight.iter().enumerate() {
                     self.parents[*child as usize] = (self.nodes.len() * LANES + lane) as u32;
                 }
-                self.push(node);
-                // Below it there may be some.
-                self.room.iter_mut().next_back().into_iter().for_each(|room| *room = 1);
+                let room = eight.iter().map(|child| u8::from(self.room[*child as usize] > 0)).sum();
+                self.push(node, room);
             }
             level = (first..self.nodes.len() as u32).collect();
         }

@@ -2,8 +2,11 @@
 
 use super::node::LANES;
 use crate::Aabb;
+use crate::aabb::ordered;
 use crate::parallel::{available_threads, both, run_parts, split_into};
 use crate::policy::PARALLEL_FROM_BOXES;
+use crate::simd::{Simd, dispatch};
+use arrayvec::ArrayVec;
 use std::ops::Range;
 
 /// Bits of an exponent within a class. Boxes of one class differ in size by less than 16 times, and the same axes are long,
@@ -18,6 +21,9 @@ const MAX_SAMPLED_IN_ALL: usize = 2048;
 
 /// Minimum number of sampled boxes around a part that tell which are around its halves.
 const MIN_SAMPLED: usize = 16;
+
+/// Maximum number of boxes that are sorted to part them: words are compared without a branch.
+const MAX_SORTED: usize = 64;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Order {
@@ -68,29 +74,21 @@ impl Entry {
     }
 }
 
-/// Returns the exponent's bits of a number that is not negative; those of infinity for a NaN.
+/// Returns the exponent's bits of a number that is not negative; those of the largest numbers for infinity and a NaN.
 fn exponent(x: f32) -> u8 {
-    (x.to_bits() >> 23) as u8
+    ((x.to_bits() >> 23) as u8).min(254)
 }
 
 /// Returns the number with this exponent, a power of two.
 fn with_exponent(exponent: u8) -> f64 {
-    f64::from(f32::from_bits(u32::from(exponent.min(254)) << 23))
+    f64::from(f32::from_bits(u32::from(exponent) << 23))
 }
 
 /// Sorts boxes by class, and within a class by place. Returns the classes. Two sets have
 /// classes of their own. But the cuts of a set take the boxes of the other set into account, so that few of these lie across a
 /// cut.
 pub(super) fn sort(entries: &mut [Entry], Order { split, leaf }: Order) -> Vec<Range<usize>> {
-    let are_alike = |a: &Entry, b: &Entry| a.class(split) == b.class(split);
-    if !entries.windows(2).all(|two| are_alike(&two[0], &two[1])) {
-        entries.sort_unstable_by_key(|entry| entry.class(split));
-    }
-    let (mut classes, mut first) = (Vec::new(), 0);
-    for class in entries.chunk_by(are_alike) {
-        classes.push(first..first + class.len());
-        first += class.len();
-    }
+    let classes = sort_by_class(entries, split);
     let samples = sampled(entries, &classes);
     let workers = if entries.len() < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
     run_parts(workers, split_into(entries, classes.iter().map(Range::len)), |_, class| {
@@ -102,6 +100,21 @@ pub(super) fn sort(entries: &mut [Entry], Order { split, leaf }: Order) -> Vec<R
         sort_by_place(class, leaf, &Others { samples, is_few: false });
     });
     classes
+}
+
+/// Sorts boxes by class. Returns the classes.
+fn sort_by_class(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
+    let Some(first) = entries.first().map(|entry| entry.class(split)) else { return Vec::new() };
+    if entries.iter().all(|entry| entry.class(split) == first) {
+        return vec![0..entries.len()];
+    }
+    entries.sort_unstable_by_key(|entry| entry.class(split));
+    let mut first = 0;
+    let classes = entries.chunk_by(|a, b| a.class(split) == b.class(split)).map(|class| {
+        first += class.len();
+        first - class.len()..first
+    });
+    classes.collect()
 }
 
 /// Returns boxes that stand for those of each class: the fewer of one, the more classes there are.
@@ -116,18 +129,32 @@ fn sort_by_place(entries: &mut [Entry], leaf: usize, others: &Others) {
     if entries.len() <= leaf {
         return;
     }
-    let part = Measure::of(entries);
+    let part = dispatch!(Measure::of, entries);
     let mut near = others.near(&part);
     let (axis, middle) = (best_axis(&part, &near.samples), cut(entries.len(), leaf));
     near.halve(&part, axis);
     let is_few = entries.len() < PARALLEL_FROM_BOXES;
-    entries.select_nth_unstable_by(middle, |a, b| a.center[axis].total_cmp(&b.center[axis]));
+    part_at(entries, middle, axis);
     let (first, rest) = entries.split_at_mut(middle);
     if is_few {
         sort_by_place(first, leaf, &near);
         sort_by_place(rest, leaf, &near);
     } else {
         both(|| sort_by_place(first, leaf, &near), || sort_by_place(rest, leaf, &near));
+    }
+}
+
+/// Moves the boxes with the lesser centers on an axis before a place.
+fn part_at(entries: &mut [Entry], place: usize, axis: usize) {
+    let Ok(all) = ArrayVec::<Entry, MAX_SORTED>::try_from(&*entries) else {
+        entries.select_nth_unstable_by(place, |a, b| a.center[axis].total_cmp(&b.center[axis]));
+        return;
+    };
+    let word = |(i, entry): (u64, &Entry)| u64::from(ordered(entry.center[axis])) << 32 | i;
+    let mut words: ArrayVec<u64, MAX_SORTED> = (0..).zip(&all).map(word).collect();
+    words.sort_unstable();
+    for (entry, word) in entries.iter_mut().zip(words) {
+        *entry = all[word as u32 as usize];
     }
 }
 
@@ -243,20 +270,26 @@ struct Measure {
 }
 
 impl Measure {
-    fn of(entries: &[Entry]) -> Self {
-        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        let (mut extents, mut largest) = ([0.0; 3], [0; 3]);
-        for entry in entries {
-            for k in 0..3 {
-                low[k] = low[k].min(entry.center[k]);
-                high[k] = high[k].max(entry.center[k]);
-                extents[k] += with_exponent(entry.exponents[k]);
-                largest[k] = entry.exponents[k].max(largest[k]);
+    /// The loop is over four numbers at a time, of which the last is no axis: so it becomes a few instructions for each box.
+    #[inline(always)]
+    fn of(_: impl Simd, entries: &[Entry]) -> Self {
+        let (mut low, mut high) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
+        let (mut sums, mut largest) = ([0.0f64; 4], [0; 4]);
+        for Entry { center: [x, y, z], exponents, .. } in entries {
+            let center = [*x, *y, *z, *z];
+            for k in 0..4 {
+                low[k] = if center[k] < low[k] { center[k] } else { low[k] };
+                high[k] = if center[k] > high[k] { center[k] } else { high[k] };
+                sums[k] += f64::from(f32::from_bits(u32::from(exponents[k]) << 23));
+                largest[k] = exponents[k].max(largest[k]);
             }
         }
         let boxes = entries.len().max(1) as f64;
         let spread = std::array::from_fn(|k| (f64::from(high[k]) - f64::from(low[k])).max(0.0));
-        Self { boxes, low, high, spread, extents: extents.map(|sum: f64| sum / boxes), largest }
+        let three = |[x, y, z, _]: [f32; 4]| [x, y, z];
+        let extents = std::array::from_fn(|k| sums[k] / boxes);
+        let [x, y, z, _] = largest;
+        Self { boxes, low: three(low), high: three(high), spread, extents, largest: [x, y, z] }
     }
 
     /// Returns true if a box may overlap the bounds of these boxes. Centers are sums of two corners, so that two whole extents, each

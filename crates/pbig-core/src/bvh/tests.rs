@@ -90,7 +90,9 @@ fn check_form(index: &BoxIndex, boxes: &[Aabb]) {
     for (at, node) in index.nodes.iter().enumerate() {
         let free = node.children.iter().filter(|child| **child == NONE).count();
         let is_leaf = index.is_leaf(at as u32);
-        assert_eq!(usize::from(index.room[at]), if is_leaf { free } else { 1 }, "node {at}");
+        let has_room = |child: &&u32| **child != NONE && index.room[**child as usize] > 0;
+        let room = if is_leaf { free } else { node.children.iter().filter(has_room).count() };
+        assert_eq!(usize::from(index.room[at]), room, "node {at}");
         for (lane, &child) in node.children.iter().enumerate().filter(|(_, child)| **child != NONE) {
             let inner = if is_leaf { boxes[child as usize] } else { index.bounds[child as usize] };
             if is_leaf {
@@ -284,6 +286,25 @@ fn an_index_forgets_a_peak() {
         index.refresh(&rest, None);
         assert!(index.nodes.len() < 100, "{} nodes for 500 boxes", index.nodes.len());
         check(&index, &rest, &mut StdRng::seed_from_u64(1), 70.0);
+    }
+}
+
+/// Wherever boxes come, the lanes of those that went are enough for them.
+#[test]
+fn boxes_that_come_find_the_room_of_those_that_went() {
+    let (n, mut rng) = (20_000, StdRng::seed_from_u64(2));
+    let (mut boxes, elsewhere, mut index) = (scattered(n), scattered(n), BoxIndex::default());
+    let present = 0..n as u32;
+    index.refresh_present(&boxes, None, present.clone(), true);
+    for round in 0..40 {
+        let changed: Vec<u32> = (0..n as u32).filter(|id| (id * 7 + round) % 40 < 2).collect();
+        for id in &changed {
+            let is_there = (id * 7 + round) % 40 == 1;
+            boxes[*id as usize] = if is_there { elsewhere[rng.random_range(0..n)] } else { Aabb::NOWHERE };
+        }
+        index.refresh_present(&boxes, Some(&changed), present.clone(), true);
+        check_form(&index, &boxes);
+        assert!(index.loose().len() < 12, "round {round}: {} leaves outside the tree", index.loose().len());
     }
 }
 

@@ -20,11 +20,6 @@ pub(crate) fn nodes_for_sort(leaves: u32, ids: usize) -> u64 {
     64 + 256 * u64::from(leaves) + ids as u64 / 4
 }
 
-/// Returns the number of nodes that take as long as a search of so many boxes, in a grid.
-pub(crate) fn nodes_of_search(boxes: usize) -> u64 {
-    10 * boxes as u64
-}
-
 /// Minimum share of leaves with a box, as one in this number, for a layout to stay when all boxes are read.
 pub(crate) const FULL_LEAVES_SHARE: usize = 4;
 

@@ -6,6 +6,7 @@
 //! the last axis overlaps, without a test.
 
 use super::hits::{Hits, Rule};
+use crate::aabb::ordered;
 use crate::parallel::run_parts_with;
 use crate::policy::PARALLEL_FROM_BOXES;
 use crate::{Aabb, Pair};
@@ -46,13 +47,6 @@ impl Corners {
     fn overlaps(&self, other: &Self) -> bool {
         (0..3).all(|k| (self.begin[k] <= other.end[k]) & (other.begin[k] <= self.end[k]))
     }
-}
-
-/// Returns an integer in the order of the numbers that are not NaN.
-fn ordered(x: f32) -> u32 {
-    // Without a sign of zero, because -0 and 0 are one number.
-    let bits = (x + 0.0).to_bits();
-    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
 /// Finds all pairs of some boxes; with a `split`, the pairs of an id below it and an id from it on. Returns how many boxes are valid.
