@@ -120,11 +120,11 @@ fn race(
     Ok(times)
 }
 
-/// Draws all frames but the first, which is longer than all others and would flatten their lines.
+/// Draws all frames but the first, which is longer than all others and would flatten their lines. One thread's line would hide ours.
 fn plot(title: &str, times: &[Vec<f64>]) -> Plot {
-    let names = ["pbig", "pbig, one thread", NAMES[2], NAMES[3]];
-    let line = |(name, ms): (&str, &Vec<f64>)| Line::steps(name, ms[1..].iter().copied());
-    Plot::steps(title, names.into_iter().zip(times).map(line).collect())
+    let drawn = [("pbig", 0), ("pbig, a list alone", 2), ("parry 0.31, all threads", PARRY)];
+    let line = |(name, side): (&str, usize)| Line::steps(name, times[side][1..].iter().copied());
+    Plot::steps(title, drawn.into_iter().map(line).collect())
 }
 
 fn row([motion, density, side]: [&str; 3], [boxes, threads]: [usize; 2], ms: &[f64], table: &mut Table) {

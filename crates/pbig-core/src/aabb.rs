@@ -123,6 +123,7 @@ fn round_down(x: f64) -> f32 {
 }
 
 /// Returns an integer in the order of the numbers that are not NaN.
+#[inline(always)]
 pub(crate) fn ordered(x: f32) -> u32 {
     // Without a sign of zero, because -0 and 0 are one number.
     let bits = (x + 0.0).to_bits();

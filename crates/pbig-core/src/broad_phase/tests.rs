@@ -174,23 +174,27 @@ fn many_boxes_set_on_threads_are_those_set_one_by_one() {
     assert!(broad_phase.len() > 18_000, "the others are set");
 }
 
-/// Each update alone tells: no jump is tried to be looked up, and the first update after jumps is.
+/// An update tells by itself whether boxes jump. After jumps the tree is in a bad order, which takes some updates to be known.
 #[test]
 fn boxes_that_jump_are_searched_and_those_that_move_are_looked_up() {
     let (n, mut random) = (3000, StdRng::seed_from_u64(4));
     let mut broad_phase = BroadPhase::default();
     let mut centers = vec![[0.0f32; 3]; n];
     for update in 0..60 {
-        let (is_first, jumps) = (update == 0, update < 30);
+        let (is_first, jumps) = (update == 0, (5..30).contains(&update));
         for id in (0..n as u32).filter(|id| is_first || (id + update).is_multiple_of(20)) {
             let center = &mut centers[id as usize];
-            *center =
-                if jumps { [0; 3].map(|_| random.random_range(0.0..20.0)) } else { center.map(|x| x + 0.3) };
+            *center = if jumps || is_first {
+                [0; 3].map(|_| random.random_range(0.0..40.0))
+            } else {
+                center.map(|x| x + 0.3)
+            };
             broad_phase.set(id, Aabb::from_center(*center, [0.5; 3]), ProxyFilter::ALL).expect("room");
         }
         broad_phase.update().expect("few pairs");
         let is_look_up = broad_phase.report().plan.algorithm == Algorithm::LookUp;
-        assert!(is_look_up != jumps, "update {update}");
+        let is_unknown = (30..34).contains(&update);
+        assert!(is_look_up != (jumps || is_first) || is_unknown, "update {update}");
     }
     assert!(broad_phase.pairs().eq(oracle::pairs(broad_phase.fat_aabbs())));
 }

@@ -37,7 +37,7 @@ pub(crate) struct World {
     /// Ids whose box was set and not removed, valid or not.
     pub(super) present: IdSet,
     pub(super) valid: u32,
-    /// Boxes that came or jumped since the last update; one that did so again counts again.
+    /// Boxes that came or jumped since the last update. One that did so twice counts twice, and one that has left again counts, too.
     pub(super) arrived: u32,
     /// Boxes that were ever given a filter other than [`ProxyFilter::ALL`].
     pub(super) is_filtered: bool,
@@ -247,6 +247,7 @@ struct Moved {
     changed: Vec<u32>,
     /// Valid boxes that there are more, modulo 2^32.
     valid: u32,
+    /// Boxes that came or jumped.
     arrived: u32,
     is_filtered: bool,
     /// A box has changed.
@@ -319,9 +320,9 @@ impl Part<'_> {
     #[inline(always)]
     fn put(&mut self, i: usize, aabb: Aabb, margin: f32) {
         let is_valid = aabb.is_valid();
-        let was = &self.boxes[i];
-        let was_valid = !was.min[0].is_nan();
-        *self.arrived = self.arrived.saturating_add(u32::from(is_valid && !is_near(was, &aabb)));
+        let stored = &self.boxes[i];
+        let was_valid = !stored.min[0].is_nan();
+        *self.arrived = self.arrived.saturating_add(u32::from(is_valid && has_arrived(stored, &aabb)));
         self.boxes[i] = if is_valid { aabb.inflated(margin) } else { Aabb::NOWHERE };
         *self.valid = self.valid.wrapping_add(u32::from(is_valid)).wrapping_sub(u32::from(was_valid));
     }
@@ -337,15 +338,14 @@ impl Part<'_> {
     }
 }
 
-/// Returns true if a box is at most its own length away from where it was, on each axis. Any other box has come or jumped, and needs
-/// another place in a tree.
+/// Returns true if a box is new, or has jumped: the gap to its stored box is longer than four of this one's longest edges. So few of many
+/// others leave the node of a tree that has them.
 #[inline(always)]
-fn is_near(was: &Aabb, is: &Aabb) -> bool {
-    let on_axis = |k: usize| {
-        let reach = was.max[k] - was.min[k];
-        (is.min[k] - was.max[k] <= reach) & (was.min[k] - is.max[k] <= reach)
-    };
-    on_axis(0) & on_axis(1) & on_axis(2)
+fn has_arrived(stored: &Aabb, now: &Aabb) -> bool {
+    let edge = |k: usize| stored.max[k] - stored.min[k];
+    let reach = 4.0 * edge(0).max(edge(1)).max(edge(2));
+    let is_near = |k: usize| (now.min[k] - stored.max[k] <= reach) & (stored.min[k] - now.max[k] <= reach);
+    !(is_near(0) & is_near(1) & is_near(2))
 }
 
 /// Returns the maximum gap between a stored box and a box that it still holds: twice the margin. A box that shrinks more is stored
@@ -367,4 +367,34 @@ fn holds_exactly(fat: &Aabb, aabb: Aabb, slack: f32) -> bool {
         let (below, above) = (aabb.min[k] - fat.min[k], fat.max[k] - aabb.max[k]);
         near(fat.min[k], aabb.min[k], below) && near(fat.max[k], aabb.max[k], above)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_jumps_by_more_than_four_of_its_edges() {
+        let cube = |x: f32| Aabb::from_center([x, 0.0, 0.0], [0.5; 3]);
+        let plate = |z: f32| Aabb::from_center([0.0, 0.0, z], [1.0, 1.0, 0.0]);
+        let all = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
+        let half = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, 0.0, f32::INFINITY]);
+        for near in [
+            (cube(0.0), cube(5.0)),
+            (cube(5.0), cube(0.0)),
+            (plate(0.0), plate(8.0)),
+            (all, cube(1e30)),
+            (half, all),
+        ] {
+            assert!(!has_arrived(&near.0, &near.1), "{near:?}");
+        }
+        for far in [
+            (cube(0.0), cube(5.1)),
+            (cube(5.1), cube(0.0)),
+            (plate(0.0), plate(8.1)),
+            (Aabb::NOWHERE, cube(0.0)),
+        ] {
+            assert!(has_arrived(&far.0, &far.1), "{far:?}");
+        }
+    }
 }

@@ -142,10 +142,11 @@ impl BoxIndex {
         walk::overlapping(simd, self, aabb, visit)
     }
 
-    /// Counts nodes that look-ups have looked at. If they were given up, a sort pays if the order is bad.
+    /// Counts nodes that look-ups have looked at. Those that were given up count as a sort, unless boxes were sorted just now.
     pub(crate) fn note_look_ups(&mut self, nodes: u64, is_given_up: bool) {
-        self.looked_up +=
-            nodes + if is_given_up { policy::bvh::nodes_for_sort(self.leaves, self.listed) } else { 0 };
+        let is_useless = is_given_up && self.has_moved;
+        let one_sort = policy::bvh::nodes_for_sort(self.leaves, self.listed);
+        self.looked_up += nodes + if is_useless { one_sort } else { 0 };
     }
 
     /// Counts nodes that a query has looked at, where they can lead to a sort. Threads may lose each other's counts: an atomic addition

@@ -50,7 +50,7 @@ impl BoxIndex {
         self.gain_room(leaf);
     }
 
-    /// Counts a lane with room more in a node, and in those above it that had none.
+    /// Adds a free lane to a leaf, or a child with room to a node, and so on above if it had none.
     fn gain_room(&mut self, mut node: usize) {
         loop {
             self.room[node] += 1;
@@ -61,7 +61,7 @@ impl BoxIndex {
         }
     }
 
-    /// Counts a lane with room less in a node, and in those above it that have none now.
+    /// Takes a free lane from a leaf, or a child with room from a node, and so on above if it has none left.
     fn lose_room(&mut self, mut node: usize) {
         loop {
             self.room[node] -= 1;
@@ -134,7 +134,9 @@ impl BoxIndex {
         let (mut best, mut least) = (None, f32::INFINITY);
         let growths = node.growths(simd, aabb);
         for lane in (0..LANES).filter(|lane| node.children[*lane] != NONE && tried >> lane & 1 == 0) {
-            if growths[lane] < least && self.room[node.children[lane] as usize] > 0 {
+            // A child without boxes grows by infinity.
+            let is_better = best.is_none() || growths[lane] < least;
+            if is_better && self.room[node.children[lane] as usize] > 0 {
                 (best, least) = (Some(lane), growths[lane]);
             }
         }

@@ -22,7 +22,7 @@ const MAX_SAMPLED_IN_ALL: usize = 2048;
 /// Minimum number of sampled boxes around a part that tell which are around its halves.
 const MIN_SAMPLED: usize = 16;
 
-/// Maximum number of boxes that are sorted to part them: words are compared without a branch.
+/// Maximum number of boxes that are parted by sorting words, which takes no branch for each comparison.
 const MAX_SORTED: usize = 64;
 
 #[derive(Clone, Copy, Debug)]
@@ -80,6 +80,7 @@ fn exponent(x: f32) -> u8 {
 }
 
 /// Returns the number with this exponent, a power of two.
+#[inline(always)]
 fn with_exponent(exponent: u8) -> f64 {
     f64::from(f32::from_bits(u32::from(exponent) << 23))
 }
@@ -104,15 +105,15 @@ pub(super) fn sort(entries: &mut [Entry], Order { split, leaf }: Order) -> Vec<R
 
 /// Sorts boxes by class. Returns the classes.
 fn sort_by_class(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
-    let Some(first) = entries.first().map(|entry| entry.class(split)) else { return Vec::new() };
-    if entries.iter().all(|entry| entry.class(split) == first) {
+    let Some(class) = entries.first().map(|entry| entry.class(split)) else { return Vec::new() };
+    if entries.iter().all(|entry| entry.class(split) == class) {
         return vec![0..entries.len()];
     }
     entries.sort_unstable_by_key(|entry| entry.class(split));
-    let mut first = 0;
+    let mut end = 0;
     let classes = entries.chunk_by(|a, b| a.class(split) == b.class(split)).map(|class| {
-        first += class.len();
-        first - class.len()..first
+        end += class.len();
+        end - class.len()..end
     });
     classes.collect()
 }
@@ -144,7 +145,7 @@ fn sort_by_place(entries: &mut [Entry], leaf: usize, others: &Others) {
     }
 }
 
-/// Moves the boxes with the lesser centers on an axis before a place.
+/// Moves the boxes with the least centers on an axis to the front, as many as there are before a place.
 fn part_at(entries: &mut [Entry], place: usize, axis: usize) {
     let Ok(all) = ArrayVec::<Entry, MAX_SORTED>::try_from(&*entries) else {
         entries.select_nth_unstable_by(place, |a, b| a.center[axis].total_cmp(&b.center[axis]));
@@ -270,7 +271,7 @@ struct Measure {
 }
 
 impl Measure {
-    /// The loop is over four numbers at a time, of which the last is no axis: so it becomes a few instructions for each box.
+    /// Four lanes, of which the last is no axis, become vectors.
     #[inline(always)]
     fn of(_: impl Simd, entries: &[Entry]) -> Self {
         let (mut low, mut high) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
@@ -280,7 +281,7 @@ impl Measure {
             for k in 0..4 {
                 low[k] = if center[k] < low[k] { center[k] } else { low[k] };
                 high[k] = if center[k] > high[k] { center[k] } else { high[k] };
-                sums[k] += f64::from(f32::from_bits(u32::from(exponents[k]) << 23));
+                sums[k] += with_exponent(exponents[k]);
                 largest[k] = exponents[k].max(largest[k]);
             }
         }
@@ -329,6 +330,24 @@ mod tests {
             let ranges: Vec<_> = (0..classes).map(|class| class * len..(class + 1) * len).collect();
             let samples = sampled(&entries, &ranges);
             assert!((most / 2..=most).contains(&samples.len()), "{classes}: {}", samples.len());
+        }
+    }
+
+    #[test]
+    fn parts_have_the_lesser_centers_whether_words_are_sorted_or_not() {
+        for len in [2, 8, MAX_SORTED - 1, MAX_SORTED, MAX_SORTED + 1, 500] {
+            let x = |i: usize| [-0.0, 0.0, (i * 7919 % len) as f32 - 20.0, f32::MAX / 8.0][i % 4];
+            let at = |i: usize| Aabb::from_center([0.0, x(i), 0.0], [0.5; 3]);
+            let mut entries: Vec<Entry> = (0..len).map(|i| Entry::new(i as u32, &at(i))).collect();
+            for place in [1, len / 2, len - 1] {
+                part_at(&mut entries, place, 1);
+                let (first, rest) = entries.split_at(place);
+                let most = first.iter().map(|entry| entry.center[1]).fold(f32::MIN, f32::max);
+                assert!(rest.iter().all(|entry| most <= entry.center[1]), "{len} at {place}");
+                let mut ids: Vec<u32> = entries.iter().map(|entry| entry.id).collect();
+                ids.sort_unstable();
+                assert!(ids.into_iter().eq(0..len as u32));
+            }
         }
     }
 }

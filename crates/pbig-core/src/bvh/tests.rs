@@ -308,6 +308,23 @@ fn boxes_that_come_find_the_room_of_those_that_went() {
     }
 }
 
+/// A leaf that has become empty takes the next boxes there.
+#[test]
+fn boxes_that_go_and_come_back_find_their_empty_leaves() {
+    let boxes = scattered(3000);
+    let (mut index, mut without) = (BoxIndex::default(), boxes.clone());
+    index.refresh(&boxes, None);
+    for leaf in 0..index.leaves as usize / 4 {
+        let ids: Vec<u32> = index.nodes[leaf].children.iter().copied().filter(|id| *id != NONE).collect();
+        ids.iter().for_each(|id| without[*id as usize] = Aabb::NOWHERE);
+        index.refresh(&without, Some(&ids));
+        ids.iter().for_each(|id| without[*id as usize] = boxes[*id as usize]);
+        index.refresh(&without, Some(&ids));
+        check_form(&index, &without);
+    }
+    assert!(index.loose().is_empty(), "{} leaves outside the tree", index.loose().len());
+}
+
 /// Boxes that come after a sort make queries slow only until these have paid for the next one.
 #[test]
 fn later_boxes_are_sorted_in_once_queries_have_paid() {

@@ -48,7 +48,7 @@ pub(crate) struct GivenUp {
     /// Number of changed boxes of the last update in which it was given up; 0 for a search of all boxes.
     changed: usize,
     /// Calls without it after that.
-    searches: u32,
+    pause: u32,
     /// Calls without it that are still to come.
     left: u32,
 }
@@ -63,10 +63,10 @@ impl GivenUp {
 
     pub(crate) fn note(&mut self, is_given_up: bool, changed: usize) {
         if is_given_up {
-            let searches = (2 * self.searches).clamp(1, MAX_WITHOUT);
-            *self = Self { changed, searches, left: searches };
+            let pause = (2 * self.pause).clamp(1, MAX_WITHOUT);
+            *self = Self { changed, pause, left: pause };
         } else {
-            self.searches /= 2;
+            self.pause /= 2;
         }
     }
 }
