@@ -174,7 +174,7 @@ fn many_boxes_set_on_threads_are_those_set_one_by_one() {
     assert!(broad_phase.len() > 18_000, "the others are set");
 }
 
-/// An update tells by itself whether boxes jump. After jumps the tree is in a bad order, which takes some updates to be known.
+/// Jumps are not tried to be looked up again and again. After them the tree is in a bad order, which takes some updates to be known.
 #[test]
 fn boxes_that_jump_are_searched_and_those_that_move_are_looked_up() {
     let (n, mut random) = (3000, StdRng::seed_from_u64(4));
@@ -197,6 +197,54 @@ fn boxes_that_jump_are_searched_and_those_that_move_are_looked_up() {
         assert!(is_look_up != (jumps || is_first) || is_unknown, "update {update}");
     }
     assert!(broad_phase.pairs().eq(oracle::pairs(broad_phase.fat_aabbs())));
+}
+
+/// Boxes that are set again and again, or come and go before an update; that are removed and set where they were; points, which
+/// are longer than nothing away wherever they move.
+#[test]
+fn boxes_that_need_no_new_places_are_looked_up_whatever_is_done_with_them() {
+    let n = 4000;
+    let at = |id: u32, edge: f32, by: f32| {
+        let apart = (id * 7919 % 101) as f32 / 101.0;
+        let center = [id % 20, id / 20 % 20, id / 400].map(|x| 2.0 * x as f32 + apart + by);
+        Aabb::from_center(center, [0.5 * edge; 3])
+    };
+    let few = |update: u32| (0..n).filter(move |id| (id + update).is_multiple_of(20));
+    let set = |of: &mut BroadPhase, id, aabb| of.set(id, aabb, ProxyFilter::ALL).expect("room");
+    let again = |of: &mut BroadPhase, update: u32| {
+        for by in [30.0, 0.0, 30.0, 0.1] {
+            few(update).take(20).for_each(|id| set(of, id, at(id, 1.0, by)));
+        }
+    };
+    let for_a_moment = |of: &mut BroadPhase, update: u32| {
+        (n..n + 400).for_each(|id| set(of, id, at(id - n, 1.0, 0.5)));
+        (n..n + 400).for_each(|id| assert!(of.remove(id)));
+        few(update).take(5).for_each(|id| set(of, id, at(id, 1.0, 0.2)));
+    };
+    let back = |of: &mut BroadPhase, update: u32| {
+        few(update).for_each(|id| assert!(of.remove(id)));
+        few(update).for_each(|id| set(of, id, at(id, 1.0, 0.01 * update as f32)));
+    };
+    let points = |of: &mut BroadPhase, update: u32| {
+        few(update).for_each(|id| set(of, id, at(id, 0.0, 0.01 * (update + 1) as f32)));
+    };
+    let all: [(&str, f32, &dyn Fn(&mut BroadPhase, u32)); 4] = [
+        ("again", 1.0, &again),
+        ("for a moment", 1.0, &for_a_moment),
+        ("back", 1.0, &back),
+        ("points", 0.0, &points),
+    ];
+    for (name, edge, change) in all {
+        let mut broad_phase = BroadPhase::default();
+        (0..n).for_each(|id| set(&mut broad_phase, id, at(id, edge, 0.0)));
+        broad_phase.update().expect("few pairs");
+        for update in 0..30 {
+            change(&mut broad_phase, update);
+            broad_phase.update().expect("few pairs");
+            assert_eq!(broad_phase.report().plan.algorithm, Algorithm::LookUp, "{name}, update {update}");
+        }
+        assert!(broad_phase.pairs().eq(oracle::pairs(broad_phase.fat_aabbs())), "{name}");
+    }
 }
 
 /// A burst of boxes that come, then one change an update: the boxes of the burst get places once.

@@ -56,7 +56,7 @@ impl BroadPhase {
             return Ok(());
         }
         let changed = self.world.changed.len();
-        if self.chooses_look_ups(changed) {
+        if self.chooses_look_ups(tree, changed) {
             let is_done = self.look_up(tree);
             self.given_up.note(!is_done, changed);
             if is_done {
@@ -82,14 +82,18 @@ impl BroadPhase {
     }
 
     /// Chooses whether the changed boxes are looked up. A search that is made because look-ups were given up counts as one of those to come.
-    fn chooses_look_ups(&mut self, changed: usize) -> bool {
+    fn chooses_look_ups(&mut self, tree: &mut Tree, changed: usize) -> bool {
         match self.config.engine {
             _ if self.config.backend == Backend::Brute => return false,
             Some(engine) => return engine == Engine::LookUp,
             None => {}
         }
         let boxes = self.world.present.len();
-        policy::may_look_up(boxes, changed, self.world.arrived as usize) && !self.given_up.forbids(changed)
+        if !policy::may_look_up(boxes, changed) || self.given_up.forbids(changed) {
+            return false;
+        }
+        let arrived = (self.world.arrived as usize).min(changed);
+        policy::may_place(boxes, arrived) || policy::may_place(boxes, tree.arrivals(&self.world))
     }
 
     /// Keeps the added pairs, and forgets the ended ones, unless the search has replaced the kept pairs.

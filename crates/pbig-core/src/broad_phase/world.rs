@@ -37,7 +37,7 @@ pub(crate) struct World {
     /// Ids whose box was set and not removed, valid or not.
     pub(super) present: IdSet,
     pub(super) valid: u32,
-    /// Boxes that came or jumped since the last update. One that did so twice counts twice, and one that has left again counts, too.
+    /// Boxes that came or jumped since the last update, or more: one that did so twice counts twice, and one that has left again counts, too.
     pub(super) arrived: u32,
     /// Boxes that were ever given a filter other than [`ProxyFilter::ALL`].
     pub(super) is_filtered: bool,
@@ -338,8 +338,8 @@ impl Part<'_> {
     }
 }
 
-/// Returns true if a box is new, or has jumped: the gap to its stored box is longer than four of this one's longest edges. So few of many
-/// others leave the node of a tree that has them.
+/// Returns true if a box is new, or has jumped: the gap to its stored box is longer than four of this one's longest edges. All others need
+/// no new places in a tree, nearly always.
 #[inline(always)]
 fn has_arrived(stored: &Aabb, now: &Aabb) -> bool {
     let edge = |k: usize| stored.max[k] - stored.min[k];

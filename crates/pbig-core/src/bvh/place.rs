@@ -11,6 +11,14 @@ use crate::simd::{Simd, dispatch};
 const TRIES: usize = 3;
 
 impl BoxIndex {
+    /// Returns how many of some boxes came or have jumped: these need new places.
+    pub(crate) fn arrivals(&self, boxes: &[Aabb], ids: &[u32]) -> usize {
+        let place = |id: u32| self.places.get(id as usize).copied().unwrap_or(NONE);
+        let aabb = |id: u32| boxes.get(id as usize).filter(|aabb| aabb.is_valid());
+        let has_arrived = |id: &&u32| aabb(**id).is_some_and(|aabb| !self.is_near(place(**id), aabb));
+        if self.end > 0 { ids.iter().filter(has_arrived).count() } else { 0 }
+    }
+
     /// Reads few boxes. Those that came, and those that have jumped, get places near others.
     pub(super) fn place(&mut self, boxes: &[Aabb], ids: &[u32]) {
         let mut order = std::mem::take(&mut self.order);

@@ -32,13 +32,16 @@ const SMALL_WORLD: usize = 4096;
 /// Minimum number of changed boxes for look-ups on several threads.
 pub(crate) const PARALLEL_FROM_CHANGES: usize = 1024;
 
-/// Returns true if an update looks up the changed boxes, of which some came or jumped.
-pub(crate) fn may_look_up(boxes: usize, changed: usize, arrived: usize) -> bool {
+/// Returns true if so many changed boxes may be looked up.
+pub(crate) fn may_look_up(boxes: usize, changed: usize) -> bool {
     let one_in = |&&(up_to, _): &&(usize, usize)| boxes <= up_to;
     let share = LOOK_UP_TO_ONE_IN.iter().find(one_in).map_or(boxes, |(_, share)| *share);
-    boxes >= LOOK_UP_FROM_BOXES
-        && changed * share <= boxes
-        && arrived <= FEW_ARRIVALS.max(boxes / PLACE_ONE_IN)
+    boxes >= LOOK_UP_FROM_BOXES && changed * share <= boxes
+}
+
+/// Returns true if so many boxes that came or have jumped get places in the tree.
+pub(crate) fn may_place(boxes: usize, arrivals: usize) -> bool {
+    arrivals <= FEW_ARRIVALS.max(boxes / PLACE_ONE_IN)
 }
 
 /// A way that was given up because it took too much work. The next updates with as many changes go another way at once: one

@@ -11,7 +11,9 @@ pub(crate) mod search;
 
 pub use backend::NoDevice;
 pub(crate) use backend::no_device;
-pub(crate) use engine::{GivenUp, PARALLEL_FROM_CHANGES, is_listed, look_up_to_nodes, may_look_up};
+pub(crate) use engine::{
+    GivenUp, PARALLEL_FROM_CHANGES, is_listed, look_up_to_nodes, may_look_up, may_place,
+};
 
 /// Minimum number of boxes for a search on several threads. Waking a thread takes about as long as 16,384 boxes take alone.
 pub(crate) const PARALLEL_FROM_BOXES: usize = 16_384;
