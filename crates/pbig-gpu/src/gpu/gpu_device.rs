@@ -36,8 +36,9 @@ pub(super) struct GpuDevice {
     /// Kernels that give the rows of a large cell equally many pairs, or do not.
     pub(super) pipelines: Mutex<HashMap<(KernelId, bool), wgpu::ComputePipeline>>,
     pub(super) is_lost: AtomicBool,
-    /// A call is in progress.
-    pub(super) is_in_call: AtomicBool,
+    /// Locked while a call of a page is in progress.
+    #[cfg(target_arch = "wasm32")]
+    pub(super) in_call: Mutex<()>,
     pub(super) hook: Mutex<Hook>,
 }
 
@@ -61,7 +62,8 @@ impl GpuDevice {
             buffers_made: AtomicU32::new(0),
             pipelines: Mutex::default(),
             is_lost: AtomicBool::new(false),
-            is_in_call: AtomicBool::new(false),
+            #[cfg(target_arch = "wasm32")]
+            in_call: Mutex::default(),
             hook: Mutex::new(Box::new(|_| ())),
         })
     }
@@ -95,12 +97,6 @@ impl GpuDevice {
 
     pub(super) fn is_lost(&self) -> bool {
         self.is_lost.load(Ordering::Relaxed)
-    }
-
-    pub(super) fn max_buffer_bytes(&self, options: &GpuOptions) -> u64 {
-        let limits = self.handle.limits();
-        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-        most.min(options.max_bytes.max(1 << 20)) / 256 * 256
     }
 
     /// Compiles all kernels.
@@ -149,6 +145,20 @@ impl GpuDevice {
         self.buffers_made.fetch_add(1, Ordering::Relaxed);
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation };
         self.handle.create_buffer(&descriptor)
+    }
+
+    /// Gives the first bytes of a buffer that the host has mapped to `take`, and unmaps the buffer.
+    pub(super) fn read<T>(
+        &self,
+        mapped: &wgpu::Buffer,
+        bytes: u64,
+        take: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, GpuError> {
+        let view = mapped.get_mapped_range(0..bytes).map_err(|_| self.give_up())?;
+        let taken = take(&view);
+        drop(view);
+        mapped.unmap();
+        Ok(taken)
     }
 
     pub(super) fn encoder(&self) -> wgpu::CommandEncoder {
