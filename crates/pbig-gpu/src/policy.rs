@@ -11,8 +11,8 @@ pub(crate) const WIDEST_ITEM: u32 = 8;
 const ENTRIES_OF_A_BOX: u64 = 64 + 27 + 8 * (MAX_LEVELS as u64 - 3) + 1;
 const _: () = assert!(MAX_SPAN == 4);
 
-/// Maximum number of boxes of a search. 32 bits count their entries, and if all lie in one cell its work items: 2^17 rows by 2^17 / 8
-/// groups of 8 columns.
+/// Maximum number of boxes of a search: 32 bits count their entries. They also count the work items of a cell that has all boxes, which
+/// are 2^17 rows by 2^17 / 8 groups of 8 columns.
 pub(crate) const MAX_BOXES: u64 = 32_000_000;
 const _: () = assert!(MAX_BOXES * ENTRIES_OF_A_BOX <= u32::MAX as u64 && MAX_BOXES <= 1 << 25);
 const _: () = assert!(MAX_BOXES <= 1 << BOX_BITS, "an entry names each box");

@@ -1,4 +1,4 @@
-//! What kernels alone know of boxes, cells and pairs.
+//! Constants, and boxes in ordered integers, as kernels and their twins use them and no host code does.
 
 use super::*;
 

@@ -1,5 +1,5 @@
 //! The forecast of a search, from the counts of earlier ones: its plan, and the lengths of its lists. A wrong plan costs time, a wrong
-//! length a repetition. So a plan is kept until the boxes have outgrown it: until then planning costs nothing.
+//! length a repetition. A plan is kept until the boxes have outgrown it: until then planning costs nothing.
 
 use super::passes;
 use super::storage::Storage;

@@ -1,8 +1,7 @@
 //! The device: its pipelines, buffers and submissions.
 
 use super::{GpuError, adapter};
-use crate::GpuOptions;
-use pbig_shaders::{KERNELS, Kernel, SCAN_OF_ROWS};
+use pbig_shaders::Kernel;
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -31,7 +30,6 @@ pub(super) struct GpuDevice {
     pub(super) queue: wgpu::Queue,
     pub(super) name: String,
     pub(super) is_software: bool,
-    pub(super) has_timestamps: bool,
     pub(super) buffers_made: AtomicU32,
     /// Kernels that give the rows of a large cell equally many pairs, or do not.
     pub(super) pipelines: Mutex<HashMap<(KernelId, bool), wgpu::ComputePipeline>>,
@@ -52,11 +50,10 @@ impl fmt::Debug for GpuDevice {
 impl GpuDevice {
     pub(super) fn new(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, GpuError> {
         check_limits(&device.limits())?;
-        let (features, info) = (device.features(), device.adapter_info());
+        let info = device.adapter_info();
         Ok(Self {
             name: adapter::describe(&info),
             is_software: info.device_type == wgpu::DeviceType::Cpu,
-            has_timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
             handle: device,
             queue,
             buffers_made: AtomicU32::new(0),
@@ -97,13 +94,6 @@ impl GpuDevice {
 
     pub(super) fn is_lost(&self) -> bool {
         self.is_lost.load(Ordering::Relaxed)
-    }
-
-    /// Compiles all kernels.
-    pub(super) fn compile_all(&self, options: &GpuOptions) {
-        for kernel in KERNELS.iter().chain(SCAN_OF_ROWS) {
-            self.pipeline(kernel, options.load_balancing);
-        }
     }
 
     /// Returns the pipeline of a kernel, which is compiled at first use.

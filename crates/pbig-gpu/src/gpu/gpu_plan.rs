@@ -56,10 +56,9 @@ impl GpuPlan {
         let (space, low) = space_of(summary, &ordinary(summary));
         let edges = split.iter().map(|level| edge(level, summary, space, wanted.max(1.0), cell_factor));
         let edges: Vec<f64> = edges.collect();
-        let ticks = Ticks::new(edges.first().copied().unwrap_or(1.0), reach(space, low));
-        let cell = ticks.cell();
-        let (tick_exponent, cells_per_tick) = (ticks.exponent_bits(), ticks.cells_per_tick);
-        let params = Params { tick_exponent, cells_per_tick, ..Params::default() };
+        let finest = edges.first().copied().unwrap_or(1.0);
+        let Ticks { exponent, cells_per_tick, cell } = Ticks::new(finest, reach(space, low));
+        let params = Params { tick_exponent: exponent, cells_per_tick, ..Params::default() };
         let mut plan = Self { cell: cell as f32, params };
         for (shift, level) in shifts(&edges, split, cell) {
             let share = max_cells.saturating_sub(1) / split.len().max(1) as u32;

@@ -32,6 +32,7 @@ use declined::Declined;
 use gpu_device::GpuDevice;
 use pbig_core::internal::Clock;
 use pbig_core::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
+use pbig_shaders::{KERNELS, SCAN_OF_ROWS};
 use resident::Resident;
 use session::Session;
 use std::sync::Arc;
@@ -149,9 +150,9 @@ impl GpuFinder {
     /// # Errors
     /// As [`GpuFinder::prepare`].
     pub async fn prepare_async(&mut self) -> Result<(), GpuError> {
-        let (device, options) = (self.open_device().await?, self.options);
+        let (device, is_balanced) = (self.open_device().await?, self.options.load_balancing);
         let compile = async || {
-            device.compile_all(&options);
+            KERNELS.iter().chain(SCAN_OF_ROWS).for_each(|kernel| drop(device.pipeline(kernel, is_balanced)));
             Ok(())
         };
         device.watch(compile).await
@@ -296,17 +297,17 @@ impl GpuFinder {
         if let Some(device) = self.device.as_ref().filter(|device| !device.is_lost()) {
             return Ok(device.clone());
         }
-        // An app's device may only have been busy for too long.
-        if let (Source::Given, Some(device)) = (&self.source, &self.device)
-            && device.is_idle_within(PROBE)
-        {
-            device.is_lost.store(false, Ordering::Relaxed);
-            return Ok(device.clone());
-        }
-        let device = match &self.source {
-            Source::Shared => GpuDevice::shared().await?,
-            Source::Own(name) => Arc::new(GpuDevice::on(&adapter::choose(name.as_deref()).await?).await?),
-            Source::Given => return Err(GpuError::Lost),
+        let device = match (&self.source, &self.device) {
+            (Source::Shared, _) => GpuDevice::shared().await?,
+            (Source::Own(name), _) => {
+                Arc::new(GpuDevice::on(&adapter::choose(name.as_deref()).await?).await?)
+            }
+            // It may only have been busy for too long.
+            (Source::Given, Some(device)) if device.is_idle_within(PROBE) => {
+                device.is_lost.store(false, Ordering::Relaxed);
+                device.clone()
+            }
+            (Source::Given, _) => return Err(GpuError::Lost),
         };
         Ok(self.device.insert(device).clone())
     }

@@ -137,8 +137,7 @@ impl Storage {
         self.check_total(id, size)?;
         let is_mapped = matches!(id, BufferId::UploadStaging(_));
         let buffer = self.device.buffer(id.name(), size, id.usage(), is_mapped);
-        let is_mapped = Arc::new(AtomicBool::new(is_mapped));
-        self.buffers.insert(id, KeptBuffer { buffer, used: bytes, is_mapped });
+        self.buffers.insert(id, KeptBuffer { buffer, used: bytes, is_mapped: Arc::new(is_mapped.into()) });
         Ok(())
     }
 
