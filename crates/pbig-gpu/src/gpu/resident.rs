@@ -80,7 +80,8 @@ impl Resident {
         encoder: &mut wgpu::CommandEncoder,
         boxes: &DeviceBoxes<'_>,
     ) -> Result<DevicePairs, GpuError> {
-        check_boxes(boxes, self.storage.max_boxes())?;
+        self.storage.check_boxes(boxes.count.into())?;
+        boxes.lists().try_for_each(check_list)?;
         self.probe(boxes)?;
         self.learn();
         let params = self.prepare(boxes).inspect_err(|error| {
@@ -178,17 +179,6 @@ impl Resident {
         steps.push(Step::Run(&shaders::CONCLUDE, Groups::Direct(1)));
         passes::record(&mut self.storage, encoder, &steps, None);
     }
-}
-
-/// Returns an error if boxes or filters do not lie in their buffers, or are more than a search can have.
-fn check_boxes(boxes: &DeviceBoxes<'_>, most: u64) -> Result<(), GpuError> {
-    if u64::from(boxes.count) > most {
-        let count = boxes.count;
-        return Err(GpuError::Argument(format!(
-            "{count} boxes, but the device or GpuOptions::max_bytes allows {most}"
-        )));
-    }
-    boxes.lists().try_for_each(check_list)
 }
 
 /// Returns an error unless a list can be copied.

@@ -53,11 +53,7 @@ impl Session {
     /// Uploads all boxes: to find those that moved, the host would have to read a copy of the last call's, too.
     fn upload(&mut self, request: &SearchRequest<'_>) -> Result<(), GpuError> {
         let mut clock = Clock::start();
-        let (count, limit) = (request.boxes.len() as u64, self.storage.max_boxes());
-        if count > limit {
-            let [bytes, limit] = [count, limit].map(|boxes| boxes * size_of::<Aabb>() as u64);
-            return Err(GpuError::too_large("boxes", bytes, limit));
-        }
+        self.storage.check_boxes(request.boxes.len() as u64)?;
         self.found.report.uploaded = self.storage.upload(Buffer::Boxes, request.boxes)?
             + self.storage.upload(Buffer::Filters, request.filters.unwrap_or(&[]))?;
         self.found.report.upload = clock.lap();

@@ -113,16 +113,21 @@ impl Storage {
         Arc::ptr_eq(&self.device, device) && self.options == *options
     }
 
-    /// Returns the most boxes that fit every buffer.
-    pub(super) fn max_boxes(&self) -> u64 {
-        (self.max_buffer_bytes / BOX_BYTES).min(MAX_BOXES)
+    /// Returns an error if so many boxes do not fit every buffer.
+    pub(super) fn check_boxes(&self, boxes: u64) -> Result<(), GpuError> {
+        let most = (self.max_buffer_bytes / BOX_BYTES).min(MAX_BOXES);
+        let why = || format!("{boxes} boxes, but the device or GpuOptions::max_bytes allows {most}");
+        if boxes <= most { Ok(()) } else { Err(GpuError::Declined(why())) }
     }
 
     /// Makes a buffer at least `bytes` long. A buffer that has to grow loses its content.
     pub(super) fn ensure(&mut self, id: impl Into<BufferId>, bytes: u64) -> Result<(), GpuError> {
         let (id, limit) = (id.into(), self.max_buffer_bytes);
         if bytes > limit {
-            return Err(GpuError::too_large(id.name(), bytes, limit));
+            let what = id.name();
+            return Err(GpuError::Declined(format!(
+                "the buffer {what} needs {bytes} bytes, but the device or GpuOptions::max_bytes allows {limit}"
+            )));
         }
         let bytes = bytes.max(MIN_BUFFER_BYTES);
         if let Some(kept) = self.buffers.get_mut(&id).filter(|kept| kept.buffer.size() >= bytes) {
