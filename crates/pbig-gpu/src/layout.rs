@@ -15,8 +15,6 @@ pub const MAX_SPAN: u32 = 4;
 /// Fewest cells along an axis that is divided. Two overlapping boxes must not meet a second time by wrapping around, so the
 /// `2 * MAX_SPAN - 1` cells that they touch together must be distinct.
 pub const FEWEST_CELLS: u32 = 2 * MAX_SPAN;
-/// [`Located::shape`] of an invalid box.
-pub const NO_LEVEL: u32 = u32::MAX;
 /// Number of cells of a workgroup of the schedule.
 pub const CELLS_PER_BLOCK: u32 = 4 * LANES;
 /// Number of lists of a workgroup of the scan.
@@ -25,18 +23,10 @@ pub const COUNTS_PER_BLOCK: u32 = 4 * LANES;
 pub const SHORT_ROW: u32 = 512;
 /// Second boxes of a window of a long row, which a workgroup orders.
 pub const WINDOW: u32 = 32_768;
-/// Number of pairs of a long row that a workgroup moves.
-pub const PIECE: u32 = 4096;
-/// Index of the number of pieces among the words of [`pbig_shaders::Buffer::LongRows`].
-pub const PIECES: u32 = 3;
-/// Index of the first piece there. Each has three words.
+/// Index of the first piece among the words of [`pbig_shaders::Buffer::LongRows`]. Each has three words.
 pub const FIRST_PIECE: u32 = 4;
-/// Bits of [`Located::shape`] for the level. Above them are the numbers of cells less one, two bits an axis.
-pub const SPAN_BITS: u32 = 4;
 /// Number of bits of an entry for the box. Above them are an unused bit and the axes.
 pub const BOX_BITS: u32 = 28;
-/// The first of three bits of an entry, one for each axis. A bit is set if this is the box's lowest cell on the axis.
-pub const AXIS_BITS: u32 = 29;
 /// Bit of [`Params::flags`]: filters are tested.
 pub const FILTERED: u32 = 1;
 /// Bit of [`Params::flags`]: redundant tests and overlaps are counted.
@@ -68,9 +58,7 @@ macro_rules! shared_structs {
 }
 
 shared_structs! {
-    /// An [`Aabb`] in ordered integers, see [`ordered`].
-    DeviceBox { low: [i32; 3], high: [i32; 3] }
-    /// Cells that a box touches at its level: the lowest ones; the level and the numbers of cells, or [`NO_LEVEL`].
+    /// Cells that a box touches at its level: the lowest ones; the level and the numbers of cells, or none.
     Located { low: [i32; 3], shape: u32 }
     /// Cells of one size.
     Level { dims: [u32; 3], shift: u32, first_cell: u32, unused: [u32; 3] }
@@ -129,26 +117,6 @@ impl PairCount {
     }
 }
 
-impl DeviceBox {
-    /// A box that overlaps nothing: all of `low` lies above all of `high`, beyond the infinities.
-    pub const INVALID: Self = Self { low: [i32::MAX; 3], high: [i32::MIN; 3] };
-
-    /// Returns the box in ordered integers.
-    #[inline]
-    pub fn new(aabb: &Aabb) -> Self {
-        let valid = Self { low: aabb.min.map(ordered), high: aabb.max.map(ordered) };
-        if aabb.is_valid() { valid } else { Self::INVALID }
-    }
-}
-
-/// Returns an integer for a float, in the same order; both zeros become one. Devices may flush denormals and may assume
-/// that there are no infinities, but they compare integers exactly.
-#[inline]
-pub fn ordered(x: f32) -> i32 {
-    let bits = (x + 0.0).to_bits() as i32;
-    bits ^ (((bits >> 31) as u32) >> 1) as i32
-}
-
 /// Returns the number of two halves.
 pub fn wide([low, high]: [u32; 2]) -> u64 {
     u64::from(high) << 32 | u64::from(low)
@@ -159,5 +127,8 @@ pub fn halves(x: u64) -> [u32; 2] {
     [x as u32, (x >> 32) as u32]
 }
 
-/// A filter is one `vec4<u32>` on the device.
-const _: () = assert!(size_of::<ProxyFilter>() == 16);
+/// Bytes of a box on the device: six floats.
+pub(crate) const BOX_BYTES: u64 = size_of::<Aabb>() as u64;
+/// Bytes of a filter on the device: one `vec4<u32>`.
+pub(crate) const FILTER_BYTES: u64 = size_of::<ProxyFilter>() as u64;
+const _: () = assert!(BOX_BYTES == 24 && FILTER_BYTES == 16);

@@ -1,9 +1,21 @@
 //! The rules on counts by which the device declines a call, and the limit of a dispatch.
 
 use crate::GpuOptions;
+use crate::layout::{BOX_BITS, MAX_LEVELS, MAX_SPAN};
 
 /// Maximum number of segments of columns of a large item.
 pub(crate) const WIDEST_ITEM: u32 = 8;
+
+/// Maximum number of entries of a box: in the cells of its own level, of the next one and so on, and in the last level's only cell. A
+/// coarser cell is at least two finer ones long, so a box touches 4, then 3, then 2 cells on an axis.
+const ENTRIES_OF_A_BOX: u64 = 64 + 27 + 8 * (MAX_LEVELS as u64 - 3) + 1;
+const _: () = assert!(MAX_SPAN == 4);
+
+/// Maximum number of boxes of a search: 32 bits count their entries. They also count the work items of a cell that has all boxes, which
+/// are 2^17 rows by 2^17 / 8 groups of 8 columns.
+pub(crate) const MAX_BOXES: u64 = 32_000_000;
+const _: () = assert!(MAX_BOXES * ENTRIES_OF_A_BOX <= u32::MAX as u64 && MAX_BOXES <= 1 << 25);
+const _: () = assert!(MAX_BOXES <= 1 << BOX_BITS, "an entry names each box");
 
 /// Maximum number of tests for each box and binary logarithm of the number of boxes. Uniform cubes make about one.
 const TESTS_PER_BOX_AND_LOG: u64 = 3;
@@ -41,6 +53,15 @@ mod tests {
     #[test]
     fn no_dispatch_of_the_defaults_makes_more_than_two_billion_tests() {
         assert_eq!(tests_of_dispatch(GpuOptions::DEFAULT.chunk, WIDEST_ITEM), 1 << 31);
+    }
+
+    /// The table against the kernels' shifts: boxes of up to four cells on an axis, wherever they begin.
+    #[test]
+    fn a_box_has_no_more_entries_than_the_boxes_allow_for() {
+        let touched =
+            |low: u64, shift: usize| ((low + u64::from(MAX_SPAN) - 1) >> shift) - (low >> shift) + 1;
+        let most = |shift: usize| (0..1024).map(|low| touched(low, shift).pow(3)).max().expect("numbers");
+        assert_eq!((0..MAX_LEVELS - 1).map(most).sum::<u64>() + 1, ENTRIES_OF_A_BOX);
     }
 
     #[test]

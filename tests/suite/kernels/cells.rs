@@ -28,7 +28,7 @@ fn every_float_has_the_cell_of_the_twin_and_cells_never_fall() {
     for (tick_exponent, cells_per_tick) in [(1, 1 << 16), (47, 4096), (127, 8191), (150, 1), (248, 1 << 16)] {
         let before = undivided(boxes.clone(), tick_exponent, cells_per_tick);
         assert_eq!(fault(twin("locate"), &GpuOptions::DEFAULT, &before), None, "{tick_exponent}");
-        let cells = ends.iter().map(|x| finest_cell(&before.params, layout::ordered(*x)));
+        let cells = ends.iter().map(|x| finest_cell(&before.params, ordered(*x)));
         let cells: Vec<i32> = cells.collect();
         assert!(cells.is_sorted() && cells[0] == 0, "{tick_exponent}");
         let last = (i64::from(i32::MAX) * i64::from(cells_per_tick)) >> 16;

@@ -65,8 +65,8 @@ fn bindings_are_those_of_the_kernels() {
 fn ordered_integers_keep_the_order_of_all_floats() {
     let above = [0.0, 1e-45, f32::MIN_POSITIVE, 1.0, f32::MAX, f32::INFINITY];
     let rising: Vec<f32> = above[1..].iter().rev().map(|x| -x).chain(above).collect();
-    assert!(rising.windows(2).all(|two| layout::ordered(two[0]) < layout::ordered(two[1])));
-    assert_eq!(layout::ordered(-0.0), layout::ordered(0.0));
+    assert!(rising.windows(2).all(|two| ordered(two[0]) < ordered(two[1])));
+    assert_eq!(ordered(-0.0), ordered(0.0));
 }
 
 #[test]

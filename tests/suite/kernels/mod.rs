@@ -12,6 +12,7 @@ mod constants;
 mod device;
 mod indices;
 mod lanes;
+mod ordered;
 mod plans;
 mod poison;
 mod single;
@@ -24,12 +25,12 @@ use checks::*;
 use compare::*;
 use device::*;
 use indices::*;
+use ordered::*;
 use pbig_core::{Aabb, Pair, ProxyFilter, oracle};
 use pbig_gpu::layout::{
-    self, AXIS_BITS, BOX_BITS, CELLS_PER_BLOCK, CLASS_WORDS, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk,
-    Counters, DeviceBox, FILTERED, FIRST_PIECE, GROUPS_PER_ROW, LANES, LargeItem, Level, Located, MAX_SPAN,
-    NO_LEVEL, PIECE, PIECES, PairCount, Params, SHORT_ROW, SPAN_BITS, SUMMARY_WORDS, Slot, SmallItem, Totals,
-    UNPLANNED, WINDOW, halves, wide,
+    self, BOX_BITS, CELLS_PER_BLOCK, CLASS_WORDS, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk, Counters, FILTERED,
+    FIRST_PIECE, GROUPS_PER_ROW, LANES, LargeItem, Level, Located, MAX_SPAN, PairCount, Params, SHORT_ROW,
+    SUMMARY_WORDS, Slot, SmallItem, Totals, UNPLANNED, WINDOW, halves, wide,
 };
 use pbig_gpu::testing::plan_params;
 use pbig_gpu::{GpuFinder, GpuOptions};

@@ -31,43 +31,32 @@ fn rank(kind: wgpu::DeviceType, low_power: bool) -> usize {
 
 /// Returns the adapter of the given name, or of `WGPU_ADAPTER_NAME`, or the best.
 pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
-    check_api()?;
-    let named = std::env::var("WGPU_ADAPTER_NAME").ok().filter(|_| name.is_none());
+    let [api, named] = ["WGPU_BACKEND", "WGPU_ADAPTER_NAME"].map(|name| std::env::var(name).ok());
+    if let Some(api) = api.as_ref().filter(|api| wgpu::Backends::from_comma_list(api).is_empty()) {
+        let why = format!(": WGPU_BACKEND={api:?} names no API (known: vulkan, metal, dx12)");
+        return Err(GpuError::NoAdapter(why));
+    }
     let all = best_first().await;
     let names: Vec<_> = all.iter().map(|adapter| adapter.get_info().name).collect();
-    let api = std::env::var("WGPU_BACKEND").ok().filter(|_| names.is_empty());
-    let cause = api.map(|api| format!("WGPU_BACKEND={api:?} leaves out other APIs"));
-    let cause = cause.or(named.as_ref().map(|_| "WGPU_ADAPTER_NAME has that name".to_owned()));
-    let place = place_of(name.or(named.as_deref()), &names).map_err(|error| blame(error, cause))?;
+    let cause = match (api, &named) {
+        (Some(api), _) if names.is_empty() => format!("; WGPU_BACKEND={api:?} leaves out other APIs"),
+        (_, Some(_)) if name.is_none() => "; WGPU_ADAPTER_NAME has that name".to_owned(),
+        _ => String::new(),
+    };
+    let place =
+        place_of(name.or(named.as_deref()), &names).map_err(|why| GpuError::NoAdapter(why + &cause))?;
     Ok(all[place].clone())
 }
 
-/// Adds what leaves no adapter.
-fn blame(error: GpuError, cause: Option<String>) -> GpuError {
-    match (error, cause) {
-        (GpuError::NoAdapter(what), Some(cause)) => GpuError::NoAdapter(format!("{what}; {cause}")),
-        (error, _) => error,
-    }
-}
-
-/// Returns the place of the first adapter with the wanted name. A part of the name is enough, in any case.
-fn place_of(wanted: Option<&str>, names: &[String]) -> Result<usize, GpuError> {
+/// Returns the place of the first adapter with the wanted name, or what was wanted and found. A part of the name is enough, in any
+/// case.
+fn place_of(wanted: Option<&str>, names: &[String]) -> Result<usize, String> {
     let part = wanted.unwrap_or_default().to_lowercase();
     names.iter().position(|name| name.to_lowercase().contains(&part)).ok_or_else(|| {
         let wanted = wanted.map(|name| format!(" named {name:?}")).unwrap_or_default();
         let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-        GpuError::NoAdapter(format!("{wanted}; found: {found}"))
+        format!("{wanted}; found: {found}")
     })
-}
-
-/// Returns an error if `WGPU_BACKEND` names no API that wgpu knows.
-fn check_api() -> Result<(), GpuError> {
-    match std::env::var("WGPU_BACKEND") {
-        Ok(api) if wgpu::Backends::from_comma_list(&api).is_empty() => Err(GpuError::NoAdapter(format!(
-            ": WGPU_BACKEND={api:?} names no API (known: vulkan, metal, dx12)"
-        ))),
-        _ => Ok(()),
-    }
 }
 
 /// Returns an adapter's name, kind and API, as reports show them.
@@ -98,12 +87,9 @@ mod tests {
             [None, Some("xe"), Some("LLVMPIPE")].map(|name| place_of(name, &names)),
             [Ok(0), Ok(0), Ok(1)]
         );
-        let why = |names: &[String]| place_of(Some("no such"), names).unwrap_err().to_string();
-        assert_eq!(why(&names), r#"no GPU adapter named "no such"; found: Iris Xe, llvmpipe (LLVM 15)"#);
-        assert_eq!(why(&[]), r#"no GPU adapter named "no such"; found: none"#);
-        let none = place_of(None, &[]).unwrap_err();
-        assert_eq!(blame(none.clone(), None).to_string(), "no GPU adapter; found: none");
-        let blamed = blame(none, Some("a variable".into())).to_string();
-        assert_eq!(blamed, "no GPU adapter; found: none; a variable");
+        let why = |wanted, names: &[String]| place_of(wanted, names).unwrap_err();
+        assert_eq!(why(Some("no such"), &names), r#" named "no such"; found: Iris Xe, llvmpipe (LLVM 15)"#);
+        assert_eq!(why(Some("no such"), &[]), r#" named "no such"; found: none"#);
+        assert_eq!(why(None, &[]), "; found: none");
     }
 }

@@ -56,13 +56,6 @@ pub enum GpuError {
 }
 
 impl GpuError {
-    /// Returns the error of a buffer of these bytes, where a limit allows fewer.
-    pub(super) fn too_large(what: &str, bytes: u64, limit: u64) -> Self {
-        Self::Declined(format!(
-            "the buffer {what} needs {bytes} bytes, but the device or GpuOptions::max_bytes allows {limit}"
-        ))
-    }
-
     /// Returns the error as the core knows it.
     pub(super) fn for_core(self) -> DeviceFailure {
         match self {

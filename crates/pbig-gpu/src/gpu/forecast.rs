@@ -1,14 +1,13 @@
-//! The forecast of a call, from the counts of earlier ones: its plan, and the lengths of its lists. A wrong plan costs time, a wrong
-//! length a repetition.
+//! The forecast of a search, from the counts of earlier ones: its plan, and the lengths of its lists. A wrong plan costs time, a wrong
+//! length a repetition. A plan is kept until the boxes have outgrown it: until then planning costs nothing.
 
-use super::GpuError;
-use super::kept_plan::{FINER_RETRY, KeptPlan};
 use super::passes;
 use super::storage::Storage;
+use super::{GpuError, GpuPlan};
 use crate::GpuOptions;
-use crate::layout::{COUNTED, Counters, FILTERED, LANES, Params, Totals, UNPLANNED};
+use crate::layout::{COUNTED, Cell, Counters, FILTERED, LANES, Params, Totals, UNPLANNED};
 use crate::pbig::Summary;
-use crate::policy::WIDEST_ITEM;
+use crate::policy::{WIDEST_ITEM, most_tests};
 use pbig_shaders::Buffer;
 
 /// Number of boxes by which lists of the first call are longer than for the boxes there are: few boxes may need many entries.
@@ -17,10 +16,21 @@ const EXTRA_BOXES: u64 = 4096;
 /// Maximum number of boxes whose pairs are all tested: the kernel counts in 32 bits, see `pair_index.wgsl`.
 const MOST_ALL_PAIRS: u32 = 32_768;
 
+/// Factor by which the number of boxes, or the work for a box, may change until a plan is outgrown.
+const OUTGROWN: u64 = 2;
+
+/// Factor on the cells with which a plan of too many tests is tried once more.
+const FINER_RETRY: f32 = 0.125;
+
+/// Maximum number of cells of a plan.
+const MAX_CELLS: u64 = 1 << 28;
+
 /// The plan and the lengths that earlier calls have told.
 #[derive(Debug, Default)]
 pub(super) struct Forecast {
-    pub(super) plan: Option<KeptPlan>,
+    kept: Option<KeptPlan>,
+    /// The plan was refused, or the boxes have outgrown it.
+    is_outdated: bool,
     /// A new plan gets finer cells, because the last plan made too many tests for the boxes that it was made for.
     pub(super) is_finer: bool,
     /// Lengths of the lists of the last map.
@@ -29,67 +39,198 @@ pub(super) struct Forecast {
     pub(super) words: u64,
 }
 
+/// A plan, and how it did.
+#[derive(Debug)]
+struct KeptPlan {
+    plan: GpuPlan,
+    boxes: u64,
+    /// Number of pairs that a sample promised.
+    pairs: u64,
+    /// Entries of cells, and tests, for a valid box in the first search.
+    first_work: Option<f64>,
+}
+
 impl Forecast {
-    /// Makes a plan for this number of boxes, on a device with buffers of at most this size.
-    pub(super) fn make_plan(&mut self, summary: &Summary, boxes: u32, options: &GpuOptions, max_bytes: u64) {
-        let cell_factor = if self.is_finer { FINER_RETRY } else { 1.0 };
-        self.plan = Some(KeptPlan::new(summary, boxes, (options, cell_factor), max_bytes));
+    /// Begins a call that finds out the lengths and the plan it needs. A plan that no search has used was made for the boxes of a call
+    /// without an answer.
+    pub(super) fn start(&mut self) {
+        self.is_finer = false;
+        self.is_outdated |= self.kept.as_ref().is_some_and(KeptPlan::is_new);
     }
 
-    /// Forgets lengths that exceed a limit, and frees all buffers, which leave no room for other boxes.
-    pub(super) fn forget_lengths(&mut self, storage: &mut Storage) {
-        (self.lists, self.words) = Default::default();
-        storage.free();
+    /// Returns the plan.
+    pub(super) fn plan(&self) -> Option<&GpuPlan> {
+        self.kept.as_ref().map(|kept| &kept.plan)
+    }
+
+    /// Returns true if a search of this number of boxes needs another plan than there is.
+    pub(super) fn needs_plan(&self, options: &GpuOptions, boxes: u32) -> bool {
+        let suits = |kept: &KeptPlan| !self.is_outdated && kept.suits(boxes);
+        needs_grid(options, boxes) && !self.kept.as_ref().is_some_and(suits)
+    }
+
+    /// Makes a plan for this number of boxes.
+    pub(super) fn make_plan(&mut self, summary: &Summary, boxes: u32, storage: &Storage) {
+        if self.kept.take_if(|kept| !kept.suits(boxes)).is_some() {
+            // The next call may have far fewer chunks.
+            self.lists = Counters::default();
+        }
+        let cell_factor = if self.is_finer { FINER_RETRY } else { 1.0 };
+        let max_cells = (storage.max_buffer_bytes / size_of::<Cell>() as u64).min(MAX_CELLS) as u32;
+        let plan = GpuPlan::new(summary, storage.options.boxes_per_cell, cell_factor, max_cells);
+        self.kept = Some(KeptPlan { plan, boxes: boxes.into(), pairs: summary.pairs(), first_work: None });
+        self.is_outdated = false;
+    }
+
+    /// Learns from the counts of a search with these parameters. Returns true if it has made all its tests.
+    pub(super) fn learn(&mut self, params: &Params, counters: &Counters) -> bool {
+        if params.levels == 0 {
+            return params.flags & UNPLANNED == 0;
+        }
+        let Some(kept) = self.kept.as_mut().filter(|kept| kept.plan.is_in(params)) else { return false };
+        // First: lists that a plan for other boxes makes are not worth their memory.
+        if !passes::tests_fit(params, counters) {
+            self.refuse(params.boxes);
+            return false;
+        }
+        self.lists = *counters;
+        let has_lists = passes::lists_fit(params, counters);
+        self.is_outdated |= has_lists && kept.is_outgrown_after(counters);
+        has_lists
+    }
+
+    /// Returns true if no plan was made since a search with these parameters was recorded.
+    pub(super) fn is_current(&self, params: &Params) -> bool {
+        self.kept.as_ref().map_or(params.levels == 0, |kept| kept.plan.is_in(params))
+    }
+
+    /// Gives up a plan that makes too many tests: it may have been made for other boxes. One that was made for these is followed by one
+    /// of finer cells: a few boxes far away leave too large ones.
+    fn refuse(&mut self, boxes: u32) {
+        if let Some(kept) = self.kept.as_ref().filter(|kept| !self.is_outdated && kept.suits(boxes)) {
+            self.is_finer = kept.is_new() && !self.is_finer;
+        }
+        (self.is_outdated, self.lists) = (true, Counters::default());
+    }
+
+    /// After a call that exceeded a limit, forgets the lengths that may have, and frees all buffers: they leave no room for other boxes.
+    pub(super) fn note_error(&mut self, error: &GpuError, storage: &mut Storage) {
+        if let GpuError::Declined(_) = error {
+            (self.lists, self.words) = Default::default();
+            storage.free();
+        }
     }
 
     /// Makes the buffers of a call, and returns its parameters. Without a plan, only few boxes are searched.
     pub(super) fn params(
         &self,
         storage: &mut Storage,
-        options: &GpuOptions,
         boxes: u32,
         has_filters: bool,
     ) -> Result<Params, GpuError> {
-        let mut params = ungridded(storage, options, boxes, has_filters);
-        let first_bytes = options.first_bytes * (u64::from(boxes) + EXTRA_BOXES);
+        let mut params = self.without_capacities(storage, boxes, has_filters);
+        let first_bytes = storage.options.first_bytes * (u64::from(boxes) + EXTRA_BOXES);
         let first_bytes = first_bytes.min(storage.max_buffer_bytes);
-        match &self.plan {
-            _ if !needs_grid(options, boxes) => {}
-            None => params.flags |= UNPLANNED,
-            Some(kept) => {
-                kept.check_entries(boxes)?;
-                params = kept.plan.add_to(params);
-                params.most_tests = kept.most_tests(boxes, options.boxes_per_cell);
-                passes::make_buffers(storage, &mut params, &self.lists, first_bytes)?;
-            }
+        if params.levels > 0 {
+            passes::make_buffers(storage, &mut params, &self.lists, first_bytes)?;
         }
         storage.ensure(Buffer::Counters, size_of::<Counters>() as u64)?;
         storage.ensure(Buffer::Totals, size_of::<Totals>() as u64)?;
         storage.ensure(Buffer::Out, (4 * self.words).max(first_bytes))?;
         Ok(params)
     }
+
+    fn without_capacities(&self, storage: &Storage, boxes: u32, has_filters: bool) -> Params {
+        let options = &storage.options;
+        let needs_grid = needs_grid(options, boxes);
+        let kept = self.kept.as_ref().filter(|_| needs_grid);
+        let is_unplanned = needs_grid && kept.is_none();
+        let flags = [(FILTERED, has_filters), (COUNTED, options.count_tests), (UNPLANNED, is_unplanned)];
+        Params {
+            boxes,
+            small_cell: options.small_cell.clamp(1, LANES),
+            // The output of a work item must fit the smallest buffer.
+            columns: if storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
+            flags: flags.into_iter().map(|(flag, is_set)| flag * u32::from(is_set)).sum(),
+            most_tests: kept.map_or(0, |kept| kept.most_tests(boxes, options.boxes_per_cell)),
+            ..kept.map_or(Params::default(), |kept| kept.plan.params)
+        }
+    }
+}
+
+impl KeptPlan {
+    /// Returns true if no search has used the plan.
+    fn is_new(&self) -> bool {
+        self.first_work.is_none()
+    }
+
+    /// Returns true if the plan was made for about as many boxes.
+    fn suits(&self, boxes: u32) -> bool {
+        let boxes = u64::from(boxes);
+        boxes <= OUTGROWN * self.boxes && self.boxes <= OUTGROWN * boxes
+    }
+
+    /// Returns the tests that a call may need, in units of [`LANES`].
+    fn most_tests(&self, boxes: u32, boxes_per_cell: f32) -> u32 {
+        let boxes = u64::from(boxes);
+        let pairs = self.pairs.saturating_mul(boxes.div_ceil(self.boxes.max(1)));
+        let most = most_tests(boxes, pairs, boxes_per_cell) / u64::from(LANES);
+        // The device takes the largest number for no limit.
+        most.min(u64::from(u32::MAX) - 1) as u32
+    }
+
+    /// Notes a call. Returns true if the work for a box has doubled or halved since the first one.
+    fn is_outgrown_after(&mut self, counters: &Counters) -> bool {
+        let &Counters { entries, tests, valid, .. } = counters;
+        let now = (f64::from(entries) + f64::from(LANES) * f64::from(tests)) / f64::from(valid.max(1));
+        let first = *self.first_work.get_or_insert(now);
+        now > OUTGROWN as f64 * first || first > OUTGROWN as f64 * now
+    }
 }
 
 /// Returns true if not every pair is tested.
-pub(super) fn needs_grid(options: &GpuOptions, boxes: u32) -> bool {
+fn needs_grid(options: &GpuOptions, boxes: u32) -> bool {
     boxes > options.all_pairs_up_to.clamp(1, MOST_ALL_PAIRS)
-}
-
-/// Returns the parameters of a call, without grid and capacities.
-fn ungridded(storage: &Storage, options: &GpuOptions, boxes: u32, has_filters: bool) -> Params {
-    Params {
-        boxes,
-        small_cell: options.small_cell.clamp(1, LANES),
-        // The output of a work item must fit the smallest buffer.
-        columns: if storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
-        flags: FILTERED * u32::from(has_filters) + COUNTED * u32::from(options.count_tests),
-        ..Params::default()
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pbig_core::Aabb;
+
+    fn kept(boxes: usize) -> KeptPlan {
+        let cubes: Vec<_> = (0..boxes).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.5; 3])).collect();
+        let plan = GpuPlan::new(&Summary::of(&cubes), GpuOptions::DEFAULT.boxes_per_cell, 1.0, 1 << 20);
+        KeptPlan { plan, boxes: boxes as u64, pairs: 0, first_work: None }
+    }
+
+    fn counted(valid: u32, entries: u32, tests: u32) -> Counters {
+        Counters { valid, entries, tests, ..Counters::default() }
+    }
+
+    #[test]
+    fn a_plan_suits_up_to_twice_as_many_boxes_and_half_as_many() {
+        let plan = kept(1000);
+        assert!(plan.suits(1000) && plan.suits(2000) && plan.suits(500));
+        assert!(!plan.suits(2001) && !plan.suits(499));
+    }
+
+    #[test]
+    fn a_plan_is_outgrown_when_work_for_a_box_doubles_or_halves() {
+        let mut plan = kept(1000);
+        assert!(!plan.is_outgrown_after(&counted(1000, 8000, 40)));
+        assert!(!plan.is_outgrown_after(&counted(2000, 16_000, 80)), "twice the boxes");
+        assert!(!plan.is_outgrown_after(&counted(1000, 8000, 70)));
+        assert!(plan.is_outgrown_after(&counted(1000, 8000, 120)));
+        assert!(plan.is_outgrown_after(&counted(1000, 4000, 15)));
+    }
+
+    /// The largest number would tell the device that there is no limit, even if its counts wrapped around.
+    #[test]
+    fn no_plan_may_need_any_number_of_tests() {
+        let plan = KeptPlan { pairs: u64::MAX, ..kept(1000) };
+        assert_eq!(plan.most_tests(u32::MAX, 4.0), u32::MAX - 1);
+    }
 
     #[test]
     fn many_boxes_have_a_grid_whatever_the_option() {

@@ -1,8 +1,7 @@
 //! The device: its pipelines, buffers and submissions.
 
 use super::{GpuError, adapter};
-use crate::GpuOptions;
-use pbig_shaders::{KERNELS, Kernel, SCAN_OF_ROWS};
+use pbig_shaders::Kernel;
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -31,13 +30,13 @@ pub(super) struct GpuDevice {
     pub(super) queue: wgpu::Queue,
     pub(super) name: String,
     pub(super) is_software: bool,
-    pub(super) has_timestamps: bool,
     pub(super) buffers_made: AtomicU32,
     /// Kernels that give the rows of a large cell equally many pairs, or do not.
     pub(super) pipelines: Mutex<HashMap<(KernelId, bool), wgpu::ComputePipeline>>,
     pub(super) is_lost: AtomicBool,
-    /// A call is in progress.
-    pub(super) is_in_call: AtomicBool,
+    /// Locked while a call of a page is in progress.
+    #[cfg(target_arch = "wasm32")]
+    pub(super) in_call: Mutex<()>,
     pub(super) hook: Mutex<Hook>,
 }
 
@@ -51,17 +50,17 @@ impl fmt::Debug for GpuDevice {
 impl GpuDevice {
     pub(super) fn new(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, GpuError> {
         check_limits(&device.limits())?;
-        let (features, info) = (device.features(), device.adapter_info());
+        let info = device.adapter_info();
         Ok(Self {
             name: adapter::describe(&info),
             is_software: info.device_type == wgpu::DeviceType::Cpu,
-            has_timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
             handle: device,
             queue,
             buffers_made: AtomicU32::new(0),
             pipelines: Mutex::default(),
             is_lost: AtomicBool::new(false),
-            is_in_call: AtomicBool::new(false),
+            #[cfg(target_arch = "wasm32")]
+            in_call: Mutex::default(),
             hook: Mutex::new(Box::new(|_| ())),
         })
     }
@@ -95,19 +94,6 @@ impl GpuDevice {
 
     pub(super) fn is_lost(&self) -> bool {
         self.is_lost.load(Ordering::Relaxed)
-    }
-
-    pub(super) fn max_buffer_bytes(&self, options: &GpuOptions) -> u64 {
-        let limits = self.handle.limits();
-        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-        most.min(options.max_bytes.max(1 << 20)) / 256 * 256
-    }
-
-    /// Compiles all kernels.
-    pub(super) fn compile_all(&self, options: &GpuOptions) {
-        for kernel in KERNELS.iter().chain(SCAN_OF_ROWS) {
-            self.pipeline(kernel, options.load_balancing);
-        }
     }
 
     /// Returns the pipeline of a kernel, which is compiled at first use.
@@ -149,6 +135,20 @@ impl GpuDevice {
         self.buffers_made.fetch_add(1, Ordering::Relaxed);
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation };
         self.handle.create_buffer(&descriptor)
+    }
+
+    /// Gives the first bytes of a buffer that the host has mapped to `take`, and unmaps the buffer.
+    pub(super) fn read<T>(
+        &self,
+        mapped: &wgpu::Buffer,
+        bytes: u64,
+        take: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, GpuError> {
+        let view = mapped.get_mapped_range(0..bytes).map_err(|_| self.give_up())?;
+        let taken = take(&view);
+        drop(view);
+        mapped.unmap();
+        Ok(taken)
     }
 
     pub(super) fn encoder(&self) -> wgpu::CommandEncoder {

@@ -6,7 +6,6 @@
 
 use super::levels::{SizeRange, levels};
 use super::ticks::Ticks;
-use crate::GpuOptions;
 use crate::layout::{FEWEST_CELLS, Level, MAX_LEVELS, MAX_SPAN, Params};
 use crate::pbig::{Summary, density_cell, ordinary, pbig_cell, space_of};
 use pbig_core::{Aabb, internal::size_class_of};
@@ -29,18 +28,16 @@ const MAX_SHIFT: u32 = 28;
 pub(super) struct GpuPlan {
     /// Edge of the cells of the finest level, in the boxes' length unit.
     pub(super) cell: f32,
-    ticks: Ticks,
-    /// Number of cells of all levels.
-    pub(super) cells: u32,
-    /// Levels, finest first. The last has one cell.
-    pub(super) levels: Vec<Level>,
+    /// The kernels' parameters of the grid; others are 0. Levels, finest first: the last has one cell.
+    pub(super) params: Params,
 }
 
 /// `4097 cells, 16 x 16 x 16 of 1.5`.
 impl fmt::Display for GpuPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} cells", self.cells)?;
-        for level in &self.levels[..self.levels.len() - 1] {
+        let Params { cells, levels, level, .. } = &self.params;
+        write!(f, "{cells} cells")?;
+        for level in &level[..*levels as usize - 1] {
             let [x, y, z] = level.dims;
             write!(f, ", {x} x {y} x {z} of {}", f64::from(self.cell) * f64::from(level.shift).exp2())?;
         }
@@ -51,17 +48,18 @@ impl fmt::Display for GpuPlan {
 impl GpuPlan {
     /// Plans the grid for the boxes behind `summary`, with at most `max_cells` cells.
     ///
-    /// `cell_factor` scales the cells: 1, or less where earlier cells held too many boxes.
-    pub(super) fn new(summary: &Summary, options: &GpuOptions, cell_factor: f32, max_cells: u32) -> Self {
+    /// A cell has about `wanted` boxes. `cell_factor` scales the cells: 1, or less where earlier cells held too many boxes.
+    pub(super) fn new(summary: &Summary, wanted: f32, cell_factor: f32, max_cells: u32) -> Self {
         let split = levels(summary);
         // The coarsest levels are kept if there are too many: finer boxes then share the first of these.
         let split = &split[split.len().saturating_sub(MAX_LEVELS - 1)..];
         let (space, low) = space_of(summary, &ordinary(summary));
-        let edges = split.iter().map(|level| edge(level, summary, space, (options, cell_factor)));
+        let edges = split.iter().map(|level| edge(level, summary, space, wanted.max(1.0), cell_factor));
         let edges: Vec<f64> = edges.collect();
-        let ticks = Ticks::new(edges.first().copied().unwrap_or(1.0), reach(space, low));
-        let cell = ticks.cell();
-        let mut plan = Self { cell: cell as f32, ticks, levels: Vec::new(), cells: 0 };
+        let finest = edges.first().copied().unwrap_or(1.0);
+        let Ticks { exponent, cells_per_tick, cell } = Ticks::new(finest, reach(space, low));
+        let params = Params { tick_exponent: exponent, cells_per_tick, ..Params::default() };
+        let mut plan = Self { cell: cell as f32, params };
         for (shift, level) in shifts(&edges, split, cell) {
             let share = max_cells.saturating_sub(1) / split.len().max(1) as u32;
             let most =
@@ -73,35 +71,25 @@ impl GpuPlan {
     }
 
     fn push(&mut self, dims: [u32; 3], shift: u32) {
-        self.levels.push(Level { dims, shift, first_cell: self.cells, unused: [0; 3] });
-        self.cells += dims.iter().product::<u32>();
+        let params = &mut self.params;
+        let level = Level { dims, shift, first_cell: params.cells, unused: [0; 3] };
+        params.level[params.levels as usize] = level;
+        params.levels += 1;
+        params.cells += dims.iter().product::<u32>();
     }
 
-    /// Returns the kernels' parameters with those that the plan sets.
-    pub(super) fn add_to(&self, params: Params) -> Params {
-        let mut params = Params {
-            tick_exponent: self.ticks.exponent_bits(),
-            cells_per_tick: self.ticks.cells_per_tick,
-            levels: self.levels.len() as u32,
-            cells: self.cells,
-            ..params
-        };
-        params.level[..self.levels.len()].copy_from_slice(&self.levels);
-        params
+    /// Returns true if these parameters have this grid.
+    pub(super) fn is_in(&self, params: &Params) -> bool {
+        let of = |it: &Params| (it.tick_exponent, it.cells_per_tick, it.level);
+        of(params) == of(&self.params)
     }
 }
 
 /// Returns the cell size of a level: by equation 6 on its boxes alone, but such that its largest box touches few
 /// cells on each axis.
-fn edge(
-    level: &SizeRange,
-    summary: &Summary,
-    space: [f32; 3],
-    (options, cell_factor): (&GpuOptions, f32),
-) -> f64 {
+fn edge(level: &SizeRange, summary: &Summary, space: [f32; 3], wanted: f32, cell_factor: f32) -> f64 {
     let of_level = |b: &&Aabb| (level.classes.0..=level.classes.1).contains(&size_class_of(b.extents()));
     let sample: Vec<Aabb> = summary.sample.iter().filter(of_level).copied().collect();
-    let wanted = options.boxes_per_cell.max(1.0);
     let cell = if sample.is_empty() {
         density_cell(level.all.boxes, space, wanted)
     } else {
@@ -190,7 +178,7 @@ fn dims(space: [f32; 3], cell: f64, most: f64) -> [u32; 3] {
 mod tests {
     use super::*;
 
-    const OPTIONS: GpuOptions = GpuOptions::DEFAULT;
+    const WANTED: f32 = crate::GpuOptions::DEFAULT.boxes_per_cell;
 
     /// Returns boxes of nine sizes on a line: of each size twenty times as many as there is room for side by side.
     fn sizes_on_a_line() -> Vec<Aabb> {
@@ -208,7 +196,7 @@ mod tests {
         assert!(sizes.len() > MAX_LEVELS, "{} levels", sizes.len());
         for (level, factor) in sizes.iter().flat_map(|level| [1.0, 1e-6].map(|factor| (level, factor))) {
             let largest = level.all.extent.into_iter().fold(0.0, f32::max);
-            let cell = edge(level, &summary, space, (&OPTIONS, factor));
+            let cell = edge(level, &summary, space, WANTED, factor);
             assert!(
                 cell * f64::from(MAX_SPAN - 2) > largest.into(),
                 "{cell}, box {largest}, factor {factor}"
@@ -229,8 +217,8 @@ mod tests {
             ("nine sizes", sizes_on_a_line(), MAX_LEVELS),
         ];
         for ((name, boxes, most), factor) in worlds.iter().flat_map(|world| [1.0, 1e-6].map(|f| (world, f))) {
-            let plan = GpuPlan::new(&Summary::of(boxes), &OPTIONS, factor, 1 << 16);
-            let Params { tick_exponent, cells_per_tick, levels, cells, .. } = plan.add_to(Params::default());
+            let plan = GpuPlan::new(&Summary::of(boxes), WANTED, factor, 1 << 16);
+            let Params { tick_exponent, cells_per_tick, levels, cells, .. } = plan.params;
             assert!((1..=248).contains(&tick_exponent), "{name}: {plan:?}");
             assert!((1..=1 << 16).contains(&cells_per_tick), "{name}: {plan:?}");
             assert!(levels as usize <= *most && cells <= 1 << 16, "{name}: {plan}");

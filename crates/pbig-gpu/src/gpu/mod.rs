@@ -8,10 +8,8 @@ mod error;
 mod forecast;
 mod gpu_device;
 mod gpu_plan;
-mod kept_plan;
 mod levels;
 mod passes;
-mod readback;
 mod reports;
 mod resident;
 mod search;
@@ -34,6 +32,7 @@ use declined::Declined;
 use gpu_device::GpuDevice;
 use pbig_core::internal::Clock;
 use pbig_core::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
+use pbig_shaders::{KERNELS, SCAN_OF_ROWS};
 use resident::Resident;
 use session::Session;
 use std::sync::Arc;
@@ -151,9 +150,9 @@ impl GpuFinder {
     /// # Errors
     /// As [`GpuFinder::prepare`].
     pub async fn prepare_async(&mut self) -> Result<(), GpuError> {
-        let (device, options) = (self.open_device().await?, self.options);
+        let (device, is_balanced) = (self.open_device().await?, self.options.load_balancing);
         let compile = async || {
-            device.compile_all(&options);
+            KERNELS.iter().chain(SCAN_OF_ROWS).for_each(|kernel| drop(device.pipeline(kernel, is_balanced)));
             Ok(())
         };
         device.watch(compile).await
@@ -215,7 +214,11 @@ impl GpuFinder {
         boxes: &DeviceBoxes<'_>,
     ) -> Result<DevicePairs, GpuError> {
         let device = self.device_now()?;
-        self.record_on(&device, encoder, boxes)
+        let mut kept = self.resident.take().filter(|kept| kept.storage.suits(&device, &self.options));
+        let resident = kept.get_or_insert_with(|| Resident::new(&device, &self.options));
+        let result = device.watch_now(|| resident.record(encoder, boxes));
+        self.resident = kept.filter(|_| !is_failure(&result));
+        result
     }
 
     /// Records a search as [`GpuFinder::record_pairs`], and submits it.
@@ -228,24 +231,9 @@ impl GpuFinder {
     ) -> Result<(DevicePairs, wgpu::SubmissionIndex), GpuError> {
         let device = self.device_now()?;
         let mut encoder = device.encoder();
-        let pairs = self.record_on(&device, &mut encoder, boxes)?;
+        let pairs = self.record_pairs(&mut encoder, boxes)?;
         let submission = device.watch_now(|| Ok(device.submit(encoder)))?;
         Ok((pairs, submission))
-    }
-
-    fn record_on(
-        &mut self,
-        device: &Arc<GpuDevice>,
-        encoder: &mut wgpu::CommandEncoder,
-        boxes: &DeviceBoxes<'_>,
-    ) -> Result<DevicePairs, GpuError> {
-        let kept = self.resident.take().filter(|kept| kept.suits(device, &self.options));
-        let mut resident = kept.unwrap_or_else(|| Resident::new(device, &self.options));
-        let result = device.watch_now(|| resident.record(encoder, boxes));
-        if matches!(result, Ok(_) | Err(GpuError::Argument(_) | GpuError::Declined(_))) {
-            self.resident = Some(resident);
-        }
-        result
     }
 
     /// Returns the device, which a page has opened before.
@@ -264,34 +252,30 @@ impl GpuFinder {
         }
         let result = self.try_run(request, found).await;
         match &result {
-            // Another call in the page is in progress.
-            Err(GpuError::Busy) => return result,
-            Err(GpuError::Declined(why)) => self.declined.note(boxes, why),
             Ok(()) => self.declined = Declined::default(),
+            Err(GpuError::Declined(why)) => self.declined.note(boxes, why),
             Err(_) => {}
         }
-        self.failed = match &result {
-            Ok(()) | Err(GpuError::Declined(_) | GpuError::TooManyPairs) => None,
-            Err(error) => Some((Clock::start(), error.to_string())),
-        };
+        let failure = result.as_ref().err().filter(|_| is_failure(&result));
+        self.failed = failure.map(|error| (Clock::start(), error.to_string()));
         result
     }
 
-    /// Runs a search in a session that is kept unless the device failed: its state may be wrong then.
+    /// Runs a search in a session that is kept unless the device failed.
     async fn try_run(
         &mut self,
         request: &SearchRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), GpuError> {
-        let mut session = self.take_session().await?;
-        let (device, pairs) = (session.device.clone(), std::mem::take(&mut found.pairs));
-        let result = device.watch(async || session.search(request, pairs).await).await;
-        if let Err(GpuError::Declined(_)) = result {
-            session.forecast.forget_lengths(&mut session.storage);
-        }
-        if matches!(result, Ok(_) | Err(GpuError::Declined(_) | GpuError::TooManyPairs | GpuError::Busy)) {
-            self.session = Some(session);
-        }
+        let kept = self.session.take();
+        let device = self.open_device().await?;
+        let mut kept = kept.filter(|kept| kept.storage.suits(&device, &self.options));
+        let search = async || {
+            let session = kept.get_or_insert_with(|| Session::new(&device, &self.options));
+            session.search(request, std::mem::take(&mut found.pairs)).await
+        };
+        let result = device.watch(search).await;
+        self.session = kept.filter(|_| !is_failure(&result));
         *found = result?;
         Ok(())
     }
@@ -308,34 +292,31 @@ impl GpuFinder {
         }
     }
 
-    async fn take_session(&mut self) -> Result<Session, GpuError> {
-        let device = self.open_device().await?;
-        match self.session.take().filter(|session| session.options == self.options) {
-            Some(session) => Ok(session),
-            None => device.watch(async || Ok(Session::new(device.clone(), &self.options))).await,
-        }
-    }
-
     /// Returns the device, or another one if it was lost.
     async fn open_device(&mut self) -> Result<Arc<GpuDevice>, GpuError> {
         if let Some(device) = self.device.as_ref().filter(|device| !device.is_lost()) {
             return Ok(device.clone());
         }
-        self.session = None;
-        // An app's device may only have been busy for too long.
-        if let (Source::Given, Some(device)) = (&self.source, &self.device)
-            && device.is_idle_within(PROBE)
-        {
-            device.is_lost.store(false, Ordering::Relaxed);
-            return Ok(device.clone());
-        }
-        let device = match &self.source {
-            Source::Shared => GpuDevice::shared().await?,
-            Source::Own(name) => Arc::new(GpuDevice::on(&adapter::choose(name.as_deref()).await?).await?),
-            Source::Given => return Err(GpuError::Lost),
+        let device = match (&self.source, &self.device) {
+            (Source::Shared, _) => GpuDevice::shared().await?,
+            (Source::Own(name), _) => {
+                Arc::new(GpuDevice::on(&adapter::choose(name.as_deref()).await?).await?)
+            }
+            // It may only have been busy for too long.
+            (Source::Given, Some(device)) if device.is_idle_within(PROBE) => {
+                device.is_lost.store(false, Ordering::Relaxed);
+                device.clone()
+            }
+            (Source::Given, _) => return Err(GpuError::Lost),
         };
         Ok(self.device.insert(device).clone())
     }
+}
+
+/// Returns true if the device failed, so that the state of buffers and forecasts may be wrong.
+fn is_failure<T>(result: &Result<T, GpuError>) -> bool {
+    use GpuError::{Argument, Busy, Declined, TooManyPairs};
+    !matches!(result, Ok(_) | Err(Argument(_) | Busy | Declined(_) | TooManyPairs))
 }
 
 impl PairDevice for GpuFinder {

@@ -5,7 +5,7 @@ use super::storage::Storage;
 use super::timer::Timer;
 use crate::layout::{
     self, CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Counters, GROUPS_PER_ROW, LANES, LargeItem, Located,
-    Params, SHORT_ROW, Slot, SmallItem, Totals, WINDOW,
+    Params, SHORT_ROW, Slot, SmallItem, Totals, UNPLANNED, WINDOW,
 };
 use pbig_core::Pair;
 use pbig_shaders::{self as shaders, Buffer, Kernel};
@@ -26,8 +26,9 @@ pub(super) enum Step {
     Run(&'static Kernel, Groups),
 }
 
-/// The step that begins the counts of a check anew.
-pub(super) const CLEAR_TOTALS: Step = Clear(Buffer::Totals, size_of::<Totals>() as u64);
+/// The steps that begin the counts of a map and of a check anew.
+pub(super) const CLEAR_COUNTERS: Step = Clear(Buffer::Counters, size_of::<Counters>() as u64);
+const CLEAR_TOTALS: Step = Clear(Buffer::Totals, size_of::<Totals>() as u64);
 
 use Buffer::{Dispatches, LongRows};
 use Groups::{Direct, Indirect};
@@ -37,9 +38,9 @@ use Step::{Clear, Run};
 pub(super) fn map_and_check(params: &Params) -> Vec<Step> {
     let by_box = Direct(params.boxes.div_ceil(LANES));
     let map = [
+        CLEAR_COUNTERS,
         CLEAR_TOTALS,
         Clear(Buffer::Cells, bytes_of::<Cell>(params.cells)),
-        Clear(Buffer::Counters, bytes_of::<Counters>(1)),
         Run(&shaders::LOCATE, by_box),
         Run(&shaders::VISIT, if params.levels > 1 { by_box } else { Direct(0) }),
         Run(&shaders::SCAN_BLOCKS, Direct((2 * params.cells).div_ceil(COUNTS_PER_BLOCK))),
@@ -59,9 +60,10 @@ pub(super) fn check() -> [Step; 3] {
     ]
 }
 
-/// Returns the steps that test every pair (Avril 3.2).
+/// Returns the steps that test every pair (Avril 3.2), or none without a plan that so many boxes need.
 pub(super) fn check_all(params: &Params) -> [Step; 2] {
-    let groups = pair_count(params.boxes).div_ceil(u64::from(LANES));
+    let is_planned = params.flags & UNPLANNED == 0;
+    let groups = if is_planned { pair_count(params.boxes).div_ceil(u64::from(LANES)) } else { 0 };
     [CLEAR_TOTALS, Run(&shaders::CHECK_ALL, Direct(groups as u32))]
 }
 
@@ -94,10 +96,13 @@ const _: () = assert!(MOST_RANKED as u64 * SHORT_ROW as u64 <= 1 << 31, "as many
 /// Returns the steps that order the next grouped pairs in their rows, of this number that are left, and long rows if these pairs are the
 /// last.
 pub(super) fn rank(left: u32) -> Vec<Step> {
-    let long_rows =
-        [&shaders::PLACE_WINDOWS, &shaders::RANK_WINDOWS].map(|it| Run(it, Indirect(LongRows, 0)));
-    let steps = [Run(&shaders::RANK_PAIRS, by_pair(left.min(MOST_RANKED)))].into_iter();
-    steps.chain(long_rows.into_iter().filter(|_| left <= MOST_RANKED)).collect()
+    let mut steps = vec![Run(&shaders::RANK_PAIRS, by_pair(left.min(MOST_RANKED)))];
+    if left <= MOST_RANKED {
+        steps.extend(
+            [&shaders::PLACE_WINDOWS, &shaders::RANK_WINDOWS].map(|it| Run(it, Indirect(LongRows, 0))),
+        );
+    }
+    steps
 }
 
 fn bytes_of<T>(elements: u32) -> u64 {
@@ -113,30 +118,29 @@ pub(super) fn make_buffers(
     first_bytes: u64,
 ) -> Result<(), GpuError> {
     let lists = (2 * params.cells).max(params.boxes);
-    let buffers = [
-        (Buffer::Located, bytes_of::<Located>(params.boxes)),
-        (Buffer::Cells, bytes_of::<Cell>(params.cells)),
-        (Buffer::Sums, bytes_of::<u32>(lists.div_ceil(COUNTS_PER_BLOCK))),
-        (Buffer::Dispatches, bytes_of::<[u32; 3]>(2)),
-    ];
-    for (buffer, bytes) in buffers {
-        storage.ensure(buffer, bytes)?;
-    }
-    let slot_bytes = first_bytes.min(bytes_of::<Slot>(params.cells));
-    let [entry, slot, small, large] =
-        [size_of::<u32>(), size_of::<Slot>(), size_of::<SmallItem>(), size_of::<LargeItem>()];
-    let lists = [
-        (Buffer::Entries, needed.entries, entry, &mut params.entry_capacity, first_bytes),
-        (Buffer::Slots, needed.slots, slot, &mut params.slot_capacity, slot_bytes),
-        (Buffer::SmallItems, needed.small_items, small, &mut params.small_capacity, first_bytes / 4),
-        (Buffer::LargeItems, needed.large_items, large, &mut params.large_capacity, first_bytes / 4),
-    ];
-    for (buffer, len, size, capacity, first_bytes) in lists {
-        let bytes = u64::from(len) * size as u64;
-        storage.ensure(buffer, bytes.max(first_bytes.min(storage.max_buffer_bytes)))?;
-        *capacity = u32::try_from(storage.size(buffer) / size as u64).unwrap_or(u32::MAX);
-    }
+    storage.ensure(Buffer::Located, bytes_of::<Located>(params.boxes))?;
+    storage.ensure(Buffer::Cells, bytes_of::<Cell>(params.cells))?;
+    storage.ensure(Buffer::Sums, bytes_of::<u32>(lists.div_ceil(COUNTS_PER_BLOCK)))?;
+    storage.ensure(Buffer::Dispatches, bytes_of::<[u32; 3]>(2))?;
+    let [slot_bytes, item_bytes] = [first_bytes.min(bytes_of::<Slot>(params.cells)), first_bytes / 4];
+    params.entry_capacity = make_list::<u32>(storage, Buffer::Entries, needed.entries, first_bytes)?;
+    params.slot_capacity = make_list::<Slot>(storage, Buffer::Slots, needed.slots, slot_bytes)?;
+    params.small_capacity =
+        make_list::<SmallItem>(storage, Buffer::SmallItems, needed.small_items, item_bytes)?;
+    params.large_capacity =
+        make_list::<LargeItem>(storage, Buffer::LargeItems, needed.large_items, item_bytes)?;
     Ok(())
+}
+
+/// Makes a buffer of at least this number of elements, and of at least `first_bytes`. Returns the number of elements that fit.
+fn make_list<T>(
+    storage: &mut Storage,
+    buffer: Buffer,
+    needed: u32,
+    first_bytes: u64,
+) -> Result<u32, GpuError> {
+    storage.ensure(buffer, bytes_of::<T>(needed).max(first_bytes))?;
+    Ok(u32::try_from(storage.size(buffer) / size_of::<T>() as u64).unwrap_or(u32::MAX))
 }
 
 /// Makes the buffers of the sort of this number of pairs.
@@ -172,53 +176,43 @@ pub(super) fn tests_fit(params: &Params, found: &Counters) -> bool {
     found.tests <= params.most_tests && found.too_many_tests == 0
 }
 
-/// A submission that is being recorded.
-pub(super) struct Recording<'a> {
-    pub(super) storage: &'a mut Storage,
-    pub(super) encoder: &'a mut wgpu::CommandEncoder,
-    /// See [`crate::GpuOptions::load_balancing`].
-    pub(super) is_balanced: bool,
-    pub(super) timer: Option<&'a mut Timer>,
-}
-
-impl Recording<'_> {
-    /// Records steps: first everything that is cleared, then the kernels. They share a pass, unless each is timed.
-    pub(super) fn record(mut self, steps: &[Step]) {
-        let mut kernels = Vec::with_capacity(steps.len());
-        for &step in steps {
-            match step {
-                Clear(buffer, bytes) => {
-                    self.encoder.clear_buffer(self.storage.get(buffer), 0, Some(bytes));
-                }
-                Run(_, Direct(0)) => {}
-                Run(kernel, groups) => kernels.push((kernel, groups)),
-            }
-        }
-        let Some(timer) = self.timer.take() else {
-            return self.run(&kernels, None);
-        };
-        for kernel in kernels {
-            self.run(&[kernel], timer.time(kernel.0));
+/// Records steps: first everything that is cleared, then the kernels. They share a pass, unless each is timed.
+pub(super) fn record(
+    storage: &mut Storage,
+    encoder: &mut wgpu::CommandEncoder,
+    steps: &[Step],
+    timer: Option<&mut Timer>,
+) {
+    let mut kernels = Vec::with_capacity(steps.len());
+    for &step in steps {
+        match step {
+            Clear(buffer, bytes) => encoder.clear_buffer(storage.get(buffer), 0, Some(bytes)),
+            Run(_, Direct(0)) => {}
+            Run(kernel, groups) => kernels.push((kernel, groups)),
         }
     }
+    let Some(timer) = timer else { return record_pass(storage, encoder, &kernels, None) };
+    for kernel in kernels {
+        record_pass(storage, encoder, &[kernel], timer.time(kernel.0));
+    }
+}
 
-    /// Records a pass.
-    fn run(
-        &mut self,
-        kernels: &[(&'static Kernel, Groups)],
-        timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>,
-    ) {
-        let descriptor = wgpu::ComputePassDescriptor { label: Some("pbig"), timestamp_writes };
-        let mut pass = self.encoder.begin_compute_pass(&descriptor);
-        for &(kernel, groups) in kernels {
-            let pipeline = self.storage.device.pipeline(kernel, self.is_balanced);
-            pass.insert_debug_marker(kernel.name);
-            pass.set_pipeline(&pipeline);
-            pass.set_bind_group(0, &self.storage.bind_group(kernel, &pipeline), &[]);
-            match groups {
-                Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
-                Indirect(buffer, at) => pass.dispatch_workgroups_indirect(self.storage.get(buffer), at),
-            }
+fn record_pass(
+    storage: &mut Storage,
+    encoder: &mut wgpu::CommandEncoder,
+    kernels: &[(&'static Kernel, Groups)],
+    timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>,
+) {
+    let descriptor = wgpu::ComputePassDescriptor { label: Some("pbig"), timestamp_writes };
+    let mut pass = encoder.begin_compute_pass(&descriptor);
+    for &(kernel, groups) in kernels {
+        let pipeline = storage.device.pipeline(kernel, storage.options.load_balancing);
+        pass.insert_debug_marker(kernel.name);
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &storage.bind_group(kernel, &pipeline), &[]);
+        match groups {
+            Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
+            Indirect(buffer, at) => pass.dispatch_workgroups_indirect(storage.get(buffer), at),
         }
     }
 }

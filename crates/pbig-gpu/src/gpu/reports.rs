@@ -1,114 +1,110 @@
-//! The counts of calls that nobody waits for: each call copies them into a small buffer, which a later call reads when it is mapped.
+//! The counts of searches, and those that nobody waits for: each call copies them into a small buffer, which a later call reads when it
+//! is mapped.
 
 use super::gpu_device::GpuDevice;
-use super::readback::{Counts, Mapped};
-use crate::layout::SUMMARY_WORDS;
+use super::storage::Storage;
+use crate::layout::{Counters, Params, SUMMARY_WORDS, Totals};
 use crate::pbig::Summary;
+use bytemuck::{Pod, Zeroable};
+use pbig_shaders::Buffer;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Maximum number of calls whose counts are on their way. The counts of further calls stay on the device.
 const MOST_REPORTS: usize = 4;
 
-const REPORT_BYTES: u64 = Counts::BYTES + 4 * SUMMARY_WORDS as u64;
+pub(super) const SUMMARY_BYTES: u64 = 4 * SUMMARY_WORDS as u64;
 
-/// The device has not been told to fill the buffer, or its commands were thrown away.
-const FREE: u8 = 0;
-const IN_FLIGHT: u8 = 1;
-const MAPPED: u8 = 2;
-
-/// A call's report.
-#[derive(Debug)]
-pub(super) struct Learned {
-    pub(super) counts: Counts,
-    /// Set if the call measured its boxes.
-    pub(super) summary: Option<Summary>,
-    /// Number of boxes of the call.
-    pub(super) boxes: u32,
-    /// Number of the call's plan.
-    pub(super) plan: u32,
+/// The counts of a call.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct Counts {
+    pub(super) counters: Counters,
+    pub(super) totals: Totals,
 }
 
-/// A buffer for a report.
+impl Counts {
+    pub(super) const BYTES: u64 = size_of::<Self>() as u64;
+
+    /// Records the copy of the counts to the start of a staging buffer.
+    pub(super) fn copy(storage: &Storage, encoder: &mut wgpu::CommandEncoder, staging: &wgpu::Buffer) {
+        let [counters, totals] = [size_of::<Counters>() as u64, size_of::<Totals>() as u64];
+        encoder.copy_buffer_to_buffer(storage.get(Buffer::Counters), 0, staging, 0, counters);
+        encoder.copy_buffer_to_buffer(storage.get(Buffer::Totals), 0, staging, counters, totals);
+    }
+}
+
+/// A buffer for a report, and the call that it reports on.
 #[derive(Debug)]
-struct Slot {
+struct Report {
     staging: wgpu::Buffer,
     /// Shared with the callback of the mapping, which is dropped with commands that are never submitted.
-    state: Arc<AtomicU8>,
+    is_mapped: Arc<AtomicBool>,
+    params: Params,
     has_summary: bool,
-    boxes: u32,
-    plan: u32,
 }
 
 /// The buffers for reports.
 #[derive(Debug, Default)]
-pub(super) struct Reports {
-    slots: Vec<Slot>,
-}
+pub(super) struct Reports(Vec<Report>);
 
-impl Slot {
+impl Report {
     fn new(device: &GpuDevice) -> Self {
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        let staging = device.buffer("report", REPORT_BYTES, usage, false);
-        Self { staging, state: Arc::new(AtomicU8::new(FREE)), has_summary: false, boxes: 0, plan: 0 }
+        let staging = device.buffer("report", Counts::BYTES + SUMMARY_BYTES, usage, false);
+        Self { staging, is_mapped: Arc::default(), params: Params::default(), has_summary: false }
     }
 
-    fn is_free(&self) -> bool {
-        let state = self.state.load(Ordering::Acquire);
-        state == FREE || (state == IN_FLIGHT && Arc::strong_count(&self.state) == 1)
+    /// Returns true if the device has not been told to fill the buffer, or its commands were thrown away.
+    fn is_free(&mut self) -> bool {
+        Arc::get_mut(&mut self.is_mapped).is_some_and(|is_mapped| !*is_mapped.get_mut())
     }
 
-    /// Reads a report, and frees the buffer.
-    fn read(&self, device: &GpuDevice) -> Option<Learned> {
-        self.state.store(FREE, Ordering::Relaxed);
-        let bytes = if self.has_summary { REPORT_BYTES } else { Counts::BYTES };
-        let mapped = Mapped::new(device, &self.staging, bytes).ok()?;
-        let (counts, words) = mapped.split_at(Counts::BYTES as usize);
-        let summary = self.has_summary.then(|| Summary::of_device(bytemuck::cast_slice(words), self.boxes));
-        Some(Learned {
-            counts: bytemuck::pod_read_unaligned(counts),
-            summary,
-            boxes: self.boxes,
-            plan: self.plan,
-        })
+    /// Returns the counts and the summary.
+    fn of_bytes(&self, bytes: &[u8]) -> (Counts, Option<Summary>) {
+        let (counts, summary) = bytes.split_at(Counts::BYTES as usize);
+        let summary = || Summary::of_device(bytemuck::cast_slice(summary), self.params.boxes);
+        (bytemuck::pod_read_unaligned(counts), self.has_summary.then(summary))
     }
 }
 
 impl Reports {
-    /// Returns the reports that have arrived. Does not wait for others.
-    pub(super) fn take(&mut self, device: &GpuDevice) -> Vec<Learned> {
-        device.poll_now();
-        let arrived = self.slots.iter().filter(|slot| slot.state.load(Ordering::Acquire) == MAPPED);
-        arrived.filter_map(|slot| slot.read(device)).collect()
-    }
-
-    /// Records the copies of a report, from the buffers of counters and totals and that of the summary, of a call with this number of boxes
-    /// and this plan.
-    pub(super) fn record(
+    /// Gives the reports that have arrived to `learn`, with the parameters of their calls. Does not wait for others.
+    pub(super) fn take(
         &mut self,
         device: &GpuDevice,
-        encoder: &mut wgpu::CommandEncoder,
-        (counters, totals, summary): (&wgpu::Buffer, &wgpu::Buffer, Option<&wgpu::Buffer>),
-        (boxes, plan): (u32, u32),
+        mut learn: impl FnMut(&Params, Counts, Option<Summary>),
     ) {
-        let Some(slot) = self.free(device) else { return };
-        (slot.has_summary, slot.boxes, slot.plan) = (summary.is_some(), boxes, plan);
-        Counts::copy(encoder, [counters, totals, &slot.staging]);
-        if let Some(summary) = summary {
-            encoder.copy_buffer_to_buffer(summary, 0, &slot.staging, Counts::BYTES, 4 * SUMMARY_WORDS as u64);
+        device.poll_now();
+        for report in self.0.iter().filter(|report| report.is_mapped.swap(false, Ordering::Acquire)) {
+            let bytes = Counts::BYTES + if report.has_summary { SUMMARY_BYTES } else { 0 };
+            if let Ok((counts, summary)) = device.read(&report.staging, bytes, |it| report.of_bytes(it)) {
+                learn(&report.params, counts, summary);
+            }
         }
-        slot.state.store(IN_FLIGHT, Ordering::Relaxed);
-        let state = slot.state.clone();
-        encoder.map_buffer_on_submit(&slot.staging, wgpu::MapMode::Read, .., move |result| {
-            state.store(if result.is_ok() { MAPPED } else { FREE }, Ordering::Release);
-        });
     }
 
-    /// Returns a buffer that the device does not use, or none if too many are on their way.
-    fn free(&mut self, device: &GpuDevice) -> Option<&mut Slot> {
-        while self.slots.len() < MOST_REPORTS {
-            self.slots.push(Slot::new(device));
+    /// Records the copies of a report on a call, unless too many are on their way.
+    pub(super) fn record(
+        &mut self,
+        storage: &Storage,
+        encoder: &mut wgpu::CommandEncoder,
+        params: &Params,
+        has_summary: bool,
+    ) {
+        while self.0.len() < MOST_REPORTS {
+            self.0.push(Report::new(&storage.device));
         }
-        self.slots.iter_mut().find(|slot| slot.is_free())
+        let Some(report) = self.0.iter_mut().find_map(|it| it.is_free().then_some(it)) else { return };
+        (report.params, report.has_summary) = (*params, has_summary);
+        Counts::copy(storage, encoder, &report.staging);
+        if has_summary {
+            let summary = storage.get(Buffer::Summary);
+            encoder.copy_buffer_to_buffer(summary, 0, &report.staging, Counts::BYTES, SUMMARY_BYTES);
+        }
+        let is_mapped = report.is_mapped.clone();
+        encoder.map_buffer_on_submit(&report.staging, wgpu::MapMode::Read, .., move |result| {
+            is_mapped.store(result.is_ok(), Ordering::Release);
+        });
     }
 }

@@ -4,15 +4,13 @@
 //! wrong plan or length costs time, or the call says that it is not complete.
 
 use super::GpuError;
-use super::forecast::{Forecast, needs_grid};
+use super::forecast::Forecast;
 use super::gpu_device::GpuDevice;
-use super::kept_plan::KeptPlan;
-use super::passes::{self, Groups, Recording, Step};
-use super::reports::{Learned, Reports};
+use super::passes::{self, Groups, Step};
+use super::reports::{Reports, SUMMARY_BYTES};
 use super::storage::Storage;
 use crate::GpuOptions;
-use crate::layout::{Chunk, Counters, DeviceBox, LANES, PairCount, Params, SUMMARY_WORDS, UNPLANNED, wide};
-use pbig_core::ProxyFilter;
+use crate::layout::{BOX_BYTES, Chunk, Counters, FILTER_BYTES, LANES, PairCount, Params, wide};
 use pbig_shaders::{self as shaders, Buffer};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -27,9 +25,21 @@ pub struct DeviceBoxes<'a> {
     pub offset: u64,
     /// Number of boxes.
     pub count: u32,
-    /// The filters, a [`ProxyFilter`] of 16 bytes for each box: a buffer whose usage includes `COPY_SRC`, and the bytes before the first
+    /// The filters, a [`pbig_core::ProxyFilter`] of 16 bytes for each box: a buffer whose usage includes `COPY_SRC`, and the bytes before the first
     /// filter, a multiple of 4. None if all boxes may pair.
     pub filters: Option<(&'a wgpu::Buffer, u64)>,
+}
+
+/// A list of the caller: the buffer that gets a copy, the caller's buffer, the first byte and the number of bytes there.
+type List<'a> = (Buffer, &'a wgpu::Buffer, u64, u64);
+
+impl<'a> DeviceBoxes<'a> {
+    fn lists(&self) -> impl Iterator<Item = List<'a>> {
+        let count = u64::from(self.count);
+        let boxes = (Buffer::Boxes, self.buffer, self.offset, BOX_BYTES * count);
+        let of_filters = move |(buffer, offset)| (Buffer::Filters, buffer, offset, FILTER_BYTES * count);
+        [boxes].into_iter().chain(self.filters.map(of_filters))
+    }
 }
 
 /// The pairs of a search, on the device. The next search of the finder overwrites both buffers, or makes larger ones.
@@ -44,14 +54,9 @@ pub struct DevicePairs {
 /// The state of a finder for boxes that live on its device.
 #[derive(Debug)]
 pub(super) struct Resident {
-    options: GpuOptions,
-    storage: Storage,
+    pub(super) storage: Storage,
     reports: Reports,
     forecast: Forecast,
-    /// Number of plans so far: a report of an earlier one says nothing of the present one.
-    plans: u32,
-    /// The boxes have outgrown the plan, or there is none: the next call measures them.
-    wants_measure: bool,
     /// The uniforms of the last call.
     uniforms: Option<(Params, Chunk)>,
     /// Hash of the caller's buffers that were used last.
@@ -61,20 +66,12 @@ pub(super) struct Resident {
 impl Resident {
     pub(super) fn new(device: &Arc<GpuDevice>, options: &GpuOptions) -> Self {
         Self {
-            options: *options,
-            storage: Storage::new(device.clone(), options),
+            storage: Storage::new(device, options),
             reports: Reports::default(),
             forecast: Forecast::default(),
-            plans: 0,
-            wants_measure: true,
             uniforms: None,
             used: None,
         }
-    }
-
-    /// Returns true if this was made for a device and options.
-    pub(super) fn suits(&self, device: &Arc<GpuDevice>, options: &GpuOptions) -> bool {
-        Arc::ptr_eq(&self.storage.device, device) && self.options == *options
     }
 
     /// Records a search. Submits nothing, and waits for nothing.
@@ -83,19 +80,18 @@ impl Resident {
         encoder: &mut wgpu::CommandEncoder,
         boxes: &DeviceBoxes<'_>,
     ) -> Result<DevicePairs, GpuError> {
-        check_boxes(boxes, self.storage.max_boxes())?;
+        self.storage.check_boxes(boxes.count.into())?;
+        boxes.lists().try_for_each(check_list)?;
         self.probe(boxes)?;
-        let learned = self.reports.take(&self.storage.device);
-        learned.into_iter().for_each(|learned| self.learn(learned));
-        let prepared = self.prepare(boxes);
-        if prepared.is_err() {
-            self.forecast.forget_lengths(&mut self.storage);
+        self.learn();
+        let params = self.prepare(boxes).inspect_err(|error| {
+            self.forecast.note_error(error, &mut self.storage);
             self.uniforms = None;
-        }
-        let params = prepared?;
+        })?;
         self.copy_boxes(encoder, boxes);
-        self.record_steps(encoder, &params);
-        self.record_report(encoder, &params);
+        let measures = self.forecast.needs_plan(&self.storage.options, params.boxes);
+        self.record_steps(encoder, &params, measures);
+        self.reports.record(&self.storage, encoder, &params, measures);
         let [pairs, count] = [Buffer::Out, Buffer::PairCount].map(|id| self.storage.get(id).clone());
         self.storage.end_call();
         Ok(DevicePairs { pairs, count })
@@ -105,17 +101,16 @@ impl Resident {
     /// the caller is finished where nobody asks what is wrong.
     fn probe(&mut self, boxes: &DeviceBoxes<'_>) -> Result<(), GpuError> {
         let mut hasher = DefaultHasher::new();
-        (boxes.buffer, boxes.filters.map(|(buffer, _)| buffer)).hash(&mut hasher);
+        boxes.lists().for_each(|(_, from, ..)| from.hash(&mut hasher));
         let hash = Some(hasher.finish());
         if self.used == hash {
             return Ok(());
         }
-        let device = self.storage.device.clone();
         self.storage.ensure(Buffer::Counters, size_of::<Counters>() as u64)?;
-        let to = self.storage.get(Buffer::Counters);
+        let (device, to) = (&self.storage.device, self.storage.get(Buffer::Counters));
         device.watch_now(|| {
             let mut encoder = device.encoder();
-            for (from, _) in [(boxes.buffer, 0)].into_iter().chain(boxes.filters) {
+            for (_, from, ..) in boxes.lists() {
                 encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size().min(4));
             }
             encoder.finish();
@@ -125,56 +120,28 @@ impl Resident {
         Ok(())
     }
 
-    /// Takes the counts of an earlier call into account, unless there is another plan since.
-    fn learn(&mut self, learned: Learned) {
-        let Learned { counts, summary, boxes, plan } = learned;
-        let needs_plan = needs_grid(&self.options, boxes);
-        if needs_plan && plan != self.plans {
-            return;
-        }
-        // Without room for the lists nothing was checked. The number of pairs does not depend on the plan.
-        let words = wide(counts.totals.words);
-        let forecast = &mut self.forecast;
-        forecast.words = if words > 0 { words } else { forecast.words };
-        if let Some(summary) = summary {
-            forecast.make_plan(&summary, boxes, &self.options, self.storage.max_buffer_bytes);
-            (self.plans, self.wants_measure) = (self.plans + 1, false);
-            return;
-        }
-        if let Some(kept) = forecast.plan.as_mut().filter(|_| needs_plan) {
-            if kept.refuses(&counts.counters, boxes, self.options.boxes_per_cell) {
-                return self.replan();
+    /// Takes the counts of earlier calls into account.
+    fn learn(&mut self) {
+        let Self { storage, reports, forecast, .. } = self;
+        reports.take(&storage.device, |params, counts, summary| {
+            if forecast.learn(params, &counts.counters) {
+                forecast.words = wide(counts.totals.words);
             }
-            self.wants_measure |= kept.is_outgrown_after(&counts.counters);
-        }
-        if needs_plan {
-            self.forecast.lists = counts.counters;
-        }
-    }
-
-    /// Gives up a plan that makes too many tests. One that was made for these boxes is followed by one of finer cells.
-    fn replan(&mut self) {
-        let forecast = &mut self.forecast;
-        let is_new = forecast.plan.as_ref().is_some_and(KeptPlan::is_new);
-        if !self.wants_measure {
-            forecast.is_finer = is_new && !forecast.is_finer;
-        }
-        self.wants_measure = true;
+            if let Some(summary) = summary.filter(|_| forecast.is_current(params)) {
+                forecast.make_plan(&summary, params.boxes, storage);
+            }
+        });
     }
 
     /// Makes the buffers of a call, and returns its parameters.
     fn prepare(&mut self, boxes: &DeviceBoxes<'_>) -> Result<Params, GpuError> {
-        let (storage, options, count) = (&mut self.storage, &self.options, boxes.count);
-        let params = self.forecast.params(storage, options, count, boxes.filters.is_some())?;
-        let is_outgrown = |kept: &KeptPlan| params.levels > 0 && !kept.suits(count as usize);
-        self.wants_measure |= self.forecast.plan.as_ref().is_some_and(is_outgrown);
-        let sizes = [
-            (Buffer::Boxes, BOX_BYTES * u64::from(count)),
-            (Buffer::Filters, boxes.filters.map_or(0, |_| FILTER_BYTES * u64::from(count))),
-            (Buffer::Summary, 4 * u64::from(SUMMARY_WORDS)),
-            (Buffer::PairCount, size_of::<PairCount>() as u64),
-        ];
-        sizes.into_iter().try_for_each(|(buffer, bytes)| storage.ensure(buffer, bytes))?;
+        let (storage, count) = (&mut self.storage, boxes.count);
+        let params = self.forecast.params(storage, count, boxes.filters.is_some())?;
+        // Kernels bind filters even if there are none.
+        storage.ensure(Buffer::Filters, 0)?;
+        boxes.lists().try_for_each(|(to, _, _, bytes)| storage.ensure(to, bytes))?;
+        storage.ensure(Buffer::Summary, SUMMARY_BYTES)?;
+        storage.ensure(Buffer::PairCount, size_of::<PairCount>() as u64)?;
         self.set_uniforms(&params)?;
         Ok(params)
     }
@@ -194,74 +161,29 @@ impl Resident {
 
     /// Copies the boxes, as bindings begin at multiples of more than a box.
     fn copy_boxes(&self, encoder: &mut wgpu::CommandEncoder, boxes: &DeviceBoxes<'_>) {
-        let count = u64::from(boxes.count);
-        let mut copy = |from, offset, to, bytes: u64| {
-            if bytes > 0 {
-                encoder.copy_buffer_to_buffer(from, offset, self.storage.get(to), 0, bytes);
-            }
-        };
-        copy(boxes.buffer, boxes.offset, Buffer::Boxes, BOX_BYTES * count);
-        if let Some((filters, offset)) = boxes.filters {
-            copy(filters, offset, Buffer::Filters, FILTER_BYTES * count);
+        for (to, from, offset, bytes) in boxes.lists().filter(|(.., bytes)| *bytes > 0) {
+            encoder.copy_buffer_to_buffer(from, offset, self.storage.get(to), 0, bytes);
         }
     }
 
-    fn record_steps(&mut self, encoder: &mut wgpu::CommandEncoder, params: &Params) {
-        let mut steps = vec![Step::Clear(Buffer::Counters, size_of::<Counters>() as u64)];
-        if params.levels > 0 {
-            steps = passes::map_and_check(params);
-        } else if params.flags & UNPLANNED == 0 {
-            steps.extend(passes::check_all(params));
+    fn record_steps(&mut self, encoder: &mut wgpu::CommandEncoder, params: &Params, measures: bool) {
+        let mut steps = if params.levels > 0 {
+            passes::map_and_check(params)
         } else {
-            steps.push(passes::CLEAR_TOTALS);
-        }
-        if self.measures(params) {
-            steps.push(Step::Clear(Buffer::Summary, 4 * u64::from(SUMMARY_WORDS)));
+            [&passes::check_all(params)[..], &[passes::CLEAR_COUNTERS]].concat()
+        };
+        if measures {
+            steps.push(Step::Clear(Buffer::Summary, SUMMARY_BYTES));
             steps.push(Step::Run(&shaders::MEASURE, Groups::Direct(params.boxes.div_ceil(LANES))));
         }
         steps.push(Step::Run(&shaders::CONCLUDE, Groups::Direct(1)));
-        let (storage, is_balanced) = (&mut self.storage, self.options.load_balancing);
-        Recording { storage, encoder, is_balanced, timer: None }.record(&steps);
-    }
-
-    /// Returns true if a call measures the boxes.
-    fn measures(&self, params: &Params) -> bool {
-        self.wants_measure && needs_grid(&self.options, params.boxes)
-    }
-
-    /// Lets the counts come home, where a later call finds them.
-    fn record_report(&mut self, encoder: &mut wgpu::CommandEncoder, params: &Params) {
-        let summary = self.measures(params).then(|| self.storage.get(Buffer::Summary));
-        let [counters, totals] = [Buffer::Counters, Buffer::Totals].map(|id| self.storage.get(id));
-        self.reports.record(
-            &self.storage.device,
-            encoder,
-            (counters, totals, summary),
-            (params.boxes, self.plans),
-        );
+        passes::record(&mut self.storage, encoder, &steps, None);
     }
 }
 
-const BOX_BYTES: u64 = size_of::<DeviceBox>() as u64;
-const FILTER_BYTES: u64 = size_of::<ProxyFilter>() as u64;
-
-/// Returns an error if boxes or filters do not lie in their buffers, or are more than a search can have.
-fn check_boxes(boxes: &DeviceBoxes<'_>, most: u64) -> Result<(), GpuError> {
-    if u64::from(boxes.count) > most {
-        let count = boxes.count;
-        return Err(GpuError::Argument(format!(
-            "{count} boxes, but the device or GpuOptions::max_bytes allows {most}"
-        )));
-    }
-    check_range("boxes", boxes.buffer, boxes.offset, BOX_BYTES * u64::from(boxes.count))?;
-    boxes.filters.map_or(Ok(()), |(buffer, offset)| {
-        check_range("filters", buffer, offset, FILTER_BYTES * u64::from(boxes.count))
-    })
-}
-
-/// Returns an error unless bytes of a buffer can be copied.
-fn check_range(what: &str, buffer: &wgpu::Buffer, offset: u64, bytes: u64) -> Result<(), GpuError> {
-    let (size, usage) = (buffer.size(), buffer.usage());
+/// Returns an error unless a list can be copied.
+fn check_list((list, buffer, offset, bytes): List<'_>) -> Result<(), GpuError> {
+    let (what, size, usage) = (list.name(), buffer.size(), buffer.usage());
     let fault = if !usage.contains(wgpu::BufferUsages::COPY_SRC) {
         format!("the buffer of {what} has the usage {usage:?}, but it needs COPY_SRC")
     } else if !offset.is_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT) {

@@ -2,9 +2,8 @@
 //! are few. Lists that did not fit are made longer, and the search is repeated.
 
 use super::GpuError;
-use super::forecast::needs_grid;
 use super::passes::{self, MOST_RANKED, pair_count};
-use super::readback::Counts;
+use super::reports::Counts;
 use super::session::Session;
 use super::storage::BufferId;
 use super::timer::Timer;
@@ -32,9 +31,15 @@ impl Session {
         self.found = DeviceFound::default();
         (self.found.pairs, self.max_pairs, self.submissions) = (pairs, request.max_pairs, 0);
         self.timer.iter_mut().for_each(Timer::start);
+        let result = self.find(request).await;
+        result.inspect_err(|error| self.forecast.note_error(error, &mut self.storage))?;
+        Ok(std::mem::take(&mut self.found))
+    }
+
+    async fn find(&mut self, request: &SearchRequest<'_>) -> Result<(), GpuError> {
         if request.boxes.len() < 2 {
             self.found.valid = count_valid(request.boxes);
-            return Ok(std::mem::take(&mut self.found));
+            return Ok(());
         }
         self.upload(request)?;
         let counts = self.count(request).await?;
@@ -42,17 +47,13 @@ impl Session {
         self.take_pairs(wide(counts.totals.words), request.is_sorted).await?;
         self.take_times().await?;
         self.storage.end_call();
-        Ok(std::mem::take(&mut self.found))
+        Ok(())
     }
 
     /// Uploads all boxes: to find those that moved, the host would have to read a copy of the last call's, too.
     fn upload(&mut self, request: &SearchRequest<'_>) -> Result<(), GpuError> {
         let mut clock = Clock::start();
-        let (count, limit) = (request.boxes.len() as u64, self.storage.max_boxes());
-        if count > limit {
-            let [bytes, limit] = [count, limit].map(|boxes| boxes * size_of::<Aabb>() as u64);
-            return Err(GpuError::too_large("boxes", bytes, limit));
-        }
+        self.storage.check_boxes(request.boxes.len() as u64)?;
         self.found.report.uploaded = self.storage.upload(Buffer::Boxes, request.boxes)?
             + self.storage.upload(Buffer::Filters, request.filters.unwrap_or(&[]))?;
         self.found.report.upload = clock.lap();
@@ -61,14 +62,11 @@ impl Session {
 
     /// Checks all pairs, again with more room if lists or pairs did not fit. Returns the counts.
     async fn count(&mut self, request: &SearchRequest<'_>) -> Result<Counts, GpuError> {
-        self.forecast.is_finer = false;
-        // A plan that no search has used was made for the boxes of a call without an answer.
-        self.forecast.plan.take_if(|kept| kept.is_new());
+        self.forecast.start();
         let boxes = request.boxes.len() as u32;
         for _ in 0..MAX_REPEATS {
             self.plan(request.boxes);
-            let (storage, options) = (&mut self.storage, &self.options);
-            self.params = self.forecast.params(storage, options, boxes, request.filters.is_some())?;
+            self.params = self.forecast.params(&mut self.storage, boxes, request.filters.is_some())?;
             let counts = self.check().await?;
             if self.accepts(&counts)? {
                 return Ok(counts);
@@ -78,17 +76,12 @@ impl Session {
         Err(GpuError::Refused("counts that contradict each other".into()))
     }
 
-    /// Makes a plan if the boxes need one, and there is none or one for many more or fewer boxes.
+    /// Makes a plan if the boxes need another one than that of the last call.
     fn plan(&mut self, boxes: &[Aabb]) {
-        let forecast = &mut self.forecast;
-        if forecast.plan.take_if(|kept| !kept.suits(boxes.len())).is_some() {
-            // The next call may have far fewer chunks.
-            forecast.lists = Counters::default();
-        }
-        if forecast.plan.is_none() && needs_grid(&self.options, boxes.len() as u32) {
+        let count = boxes.len() as u32;
+        if self.forecast.needs_plan(&self.storage.options, count) {
             let mut clock = Clock::start();
-            let (summary, max_bytes) = (Summary::of(boxes), self.storage.max_buffer_bytes);
-            forecast.make_plan(&summary, boxes.len() as u32, &self.options, max_bytes);
+            self.forecast.make_plan(&Summary::of(boxes), count, &self.storage);
             self.found.report.plan += clock.lap();
         }
     }
@@ -135,22 +128,19 @@ impl Session {
 
     /// Returns the numbers of small and of large work items of a chunk. A software adapter gets fewer, so that it answers in time.
     fn chunk_items(&self) -> [u32; 2] {
-        let share = if self.device.is_software { 4 } else { 1 };
-        self.options.chunk.map(|items| (items / share).max(1))
+        let share = if self.storage.device.is_software { 4 } else { 1 };
+        self.storage.options.chunk.map(|items| (items / share).max(1))
     }
 
-    /// Notes the lengths that a check needed. Returns false if it had less room.
-    fn accepts(&mut self, counts: &Counts) -> Result<bool, GpuError> {
-        let Counts { counters, totals } = counts;
-        if self.params.levels > 0 {
-            self.forecast.lists = *counters;
-            // First: lists that a plan for other boxes makes are not worth their memory.
-            if !passes::tests_fit(&self.params, counters) {
-                return self.replan().map(|()| false);
-            }
-            if !passes::lists_fit(&self.params, counters) {
-                return Ok(false);
-            }
+    /// Learns from the counts of a check. Returns true if it is complete.
+    ///
+    /// # Errors
+    /// If there are more pairs than the caller allows, or if a plan of finer cells makes too many tests, too.
+    fn accepts(&mut self, Counts { counters, totals }: &Counts) -> Result<bool, GpuError> {
+        let was_finer = self.forecast.is_finer;
+        if !self.forecast.learn(&self.params, counters) {
+            let is_hopeless = was_finer && !passes::tests_fit(&self.params, counters);
+            return if is_hopeless { Err(self.too_many_tests(counters)) } else { Ok(false) };
         }
         let words = wide(totals.words);
         if words / 2 > self.max_pairs {
@@ -160,23 +150,12 @@ impl Session {
         Ok(words <= self.storage.size(Buffer::Out) / 4)
     }
 
-    /// Gives up a plan that makes too many tests: it may have been made for other boxes. One that was made for these is tried once
-    /// more, with finer cells: a few boxes far away leave too large ones.
-    ///
-    /// # Errors
-    /// If that is done: the call is declined.
-    fn replan(&mut self) -> Result<(), GpuError> {
-        let forecast = &mut self.forecast;
-        let was_new = forecast.plan.take().is_some_and(|kept| kept.is_new());
-        let Counters { tests, too_many_tests, .. } = std::mem::take(&mut forecast.lists);
-        if !was_new || !std::mem::replace(&mut forecast.is_finer, true) {
-            return Ok(());
-        }
+    fn too_many_tests(&self, counters: &Counters) -> GpuError {
         let Params { boxes, most_tests, .. } = self.params;
-        let [tests, most] = [tests, most_tests].map(|tests| u64::from(LANES) * u64::from(tests));
+        let [tests, most] = [counters.tests, most_tests].map(|tests| u64::from(LANES) * u64::from(tests));
         // The number wraps around beyond 32 bits of workgroups.
-        let tests = if too_many_tests > 0 { "over 2^40".to_owned() } else { tests.to_string() };
-        Err(GpuError::Declined(format!("{tests} tests of {boxes} boxes are more than {most}")))
+        let tests = if counters.too_many_tests > 0 { "over 2^40".to_owned() } else { tests.to_string() };
+        GpuError::Declined(format!("{tests} tests of {boxes} boxes are more than {most}"))
     }
 
     /// Notes the grid, the tests and the memory of the call.
@@ -188,7 +167,7 @@ impl Session {
             self.found.valid = count_valid(request.boxes);
             self.found.checks.made = pair_count(self.params.boxes);
         }
-        if self.options.count_tests {
+        if self.storage.options.count_tests {
             let Totals { made, redundant, overlaps, .. } = counts.totals;
             let checks = &mut self.found.checks;
             (checks.made, checks.redundant) = (wide(made), wide(redundant));
@@ -196,17 +175,13 @@ impl Session {
         }
     }
 
-    /// Notes the grid, and gives up its plan if the boxes have outgrown it.
     fn note_grid(&mut self, counters: &Counters) {
-        let Some(kept) = &mut self.forecast.plan else { return };
-        let (found, plan) = (&mut self.found, &kept.plan);
+        let Some(plan) = self.forecast.plan() else { return };
+        let found = &mut self.found;
         (found.valid, found.plan) = (counters.valid, Some(plan.to_string()));
         found.checks.made = u64::from(LANES) * u64::from(counters.tests);
-        (found.report.cell, found.report.cells) = (plan.cell, plan.cells.into());
+        (found.report.cell, found.report.cells) = (plan.cell, plan.params.cells.into());
         found.report.entries = counters.entries.into();
-        if kept.is_outgrown_after(counters) {
-            self.forecast.plan = None;
-        }
     }
 
     /// Takes the pairs of this number of words, in order if the caller wants it and the device can sort so many.
@@ -243,7 +218,7 @@ impl Session {
 
     /// Returns the most bytes of pairs that come at a time.
     fn piece_bytes(&self) -> u64 {
-        let most = if self.options.pipelining { PIECE_BYTES } else { u64::MAX };
+        let most = if self.storage.options.pipelining { PIECE_BYTES } else { u64::MAX };
         self.storage.max_buffer_bytes.min(most) / 8 * 8
     }
 
@@ -265,8 +240,7 @@ impl Session {
             let which = (from / piece) as usize % 2;
             next = if range.is_empty() { None } else { Some(self.fetch_pairs(range, which)?) };
             from += piece;
-            let received = self.receive(fetch).await?;
-            self.append(bytemuck::cast_slice(&received))?;
+            self.receive(fetch, |session, bytes| session.append(bytemuck::cast_slice(bytes))).await?;
         }
         Ok(())
     }

@@ -2,9 +2,9 @@
 
 use super::forecast::Forecast;
 use super::gpu_device::GpuDevice;
-use super::passes::{Recording, Step};
-use super::readback::{Counts, Fetch, Mapped};
-use super::storage::{BufferId, Storage};
+use super::passes::{self, Step};
+use super::reports::Counts;
+use super::storage::{BufferId, Fetch, Storage};
 use super::timer::Timer;
 use super::{GpuError, wait};
 use crate::GpuOptions;
@@ -21,8 +21,6 @@ const PREFETCHED_BYTES: u64 = 3072;
 /// The state of a finder on a device, kept from call to call.
 #[derive(Debug)]
 pub(super) struct Session {
-    pub(super) device: Arc<GpuDevice>,
-    pub(super) options: GpuOptions,
     pub(super) storage: Storage,
     pub(super) timer: Option<Timer>,
     pub(super) forecast: Forecast,
@@ -39,32 +37,29 @@ pub(super) struct Session {
 }
 
 impl Session {
-    pub(super) fn new(device: Arc<GpuDevice>, options: &GpuOptions) -> Self {
+    pub(super) fn new(device: &Arc<GpuDevice>, options: &GpuOptions) -> Self {
         Self {
-            options: *options,
-            storage: Storage::new(device.clone(), options),
-            timer: Timer::new(&device, options),
+            storage: Storage::new(device, options),
+            timer: Timer::new(device, options),
             forecast: Forecast::default(),
             params: Params::default(),
             max_pairs: 0,
             found: DeviceFound::default(),
             prefetched: Vec::new(),
             submissions: 0,
-            device,
         }
     }
 
     /// Records and submits kernels that check these work items. Beyond the limits they count, and write no more.
     pub(super) fn submit(&mut self, items: Chunk, steps: &[Step]) -> Result<(), GpuError> {
         let mut clock = Clock::start();
-        let chunk = self.storage.with_room(items, self.max_pairs);
-        self.storage.write(Buffer::Params, &[self.params])?;
-        self.storage.write(Buffer::Chunk, &[chunk])?;
-        let mut encoder = self.device.encoder();
-        let Self { storage, options, timer, .. } = self;
-        let (is_balanced, timer) = (options.load_balancing, timer.as_mut());
-        Recording { storage, encoder: &mut encoder, is_balanced, timer }.record(steps);
-        self.device.submit(encoder);
+        let storage = &mut self.storage;
+        let chunk = storage.with_room(items, self.max_pairs);
+        storage.write(Buffer::Params, &[self.params])?;
+        storage.write(Buffer::Chunk, &[chunk])?;
+        let mut encoder = storage.device.encoder();
+        passes::record(storage, &mut encoder, steps, self.timer.as_mut());
+        storage.device.submit(encoder);
         self.submissions += 1;
         self.found.report.record += clock.lap();
         Ok(())
@@ -75,37 +70,38 @@ impl Session {
         let is_short = 4 * self.forecast.words <= PREFETCHED_BYTES && self.found.report.waits == 0;
         let room = PREFETCHED_BYTES.min(self.storage.size(Buffer::Out));
         let pairs = if is_short { room } else { 0 };
-        let fetch =
-            self.fetch(BufferId::Staging(0), Counts::BYTES + pairs, |storage, encoder, staging| {
-                let [counters, totals] = [Buffer::Counters, Buffer::Totals].map(|id| storage.get(id));
-                Counts::copy(encoder, [counters, totals, staging]);
-                if pairs > 0 {
-                    encoder.copy_buffer_to_buffer(storage.get(Buffer::Out), 0, staging, Counts::BYTES, pairs);
-                }
-            })?;
-        let received = self.receive(fetch).await?;
-        let (counts, pairs) = received.split_at(Counts::BYTES as usize);
-        self.prefetched = bytemuck::pod_collect_to_vec(pairs);
-        Ok(bytemuck::pod_read_unaligned(counts))
+        let copy = |storage: &Storage, encoder: &mut _, staging: &_| {
+            Counts::copy(storage, encoder, staging);
+            if pairs > 0 {
+                encoder.copy_buffer_to_buffer(storage.get(Buffer::Out), 0, staging, Counts::BYTES, pairs);
+            }
+        };
+        let fetch = self.storage.fetch(BufferId::Staging(0), Counts::BYTES + pairs, copy)?;
+        let take = |session: &mut Self, bytes: &[u8]| {
+            let (counts, pairs) = bytes.split_at(Counts::BYTES as usize);
+            session.prefetched = bytemuck::pod_collect_to_vec(pairs);
+            Ok(bytemuck::pod_read_unaligned(counts))
+        };
+        self.receive(fetch, take).await
     }
 
     /// Submits the copy of some bytes of pairs to a staging buffer.
     pub(super) fn fetch_pairs(&mut self, range: Range<u64>, which: usize) -> Result<Fetch, GpuError> {
         let bytes = range.end - range.start;
-        self.fetch(BufferId::Staging(which), bytes, |storage, encoder, staging| {
+        self.storage.fetch(BufferId::Staging(which), bytes, |storage, encoder, staging| {
             encoder.copy_buffer_to_buffer(storage.get(Buffer::Out), range.start, staging, 0, bytes);
         })
     }
 
     /// Takes the times of the call's kernels, if they are wanted.
     pub(super) async fn take_times(&mut self) -> Result<(), GpuError> {
-        let Some(timer) = self.timer.take() else { return Ok(()) };
+        let Some(timer) = &self.timer else { return Ok(()) };
         let copy = |_: &_, encoder: &mut _, staging: &_| timer.resolve(encoder, staging);
-        let fetch = self.fetch(BufferId::Staging(0), timer.bytes(), copy)?;
-        let ticks: Vec<[u64; 2]> = bytemuck::pod_collect_to_vec(&self.receive(fetch).await?);
-        let timer = self.timer.insert(timer);
-        let report = &mut self.found.report;
-        for (kernel, time) in timer.take(&ticks, self.device.queue.get_timestamp_period()) {
+        let fetch = self.storage.fetch(BufferId::Staging(0), timer.bytes(), copy)?;
+        let collect = |_: &mut Self, bytes: &[u8]| Ok(bytemuck::pod_collect_to_vec(bytes));
+        let ticks: Vec<[u64; 2]> = self.receive(fetch, collect).await?;
+        let (report, period) = (&mut self.found.report, self.storage.device.queue.get_timestamp_period());
+        for (kernel, time) in self.timer.iter_mut().flat_map(|timer| timer.take(&ticks, period)) {
             match report.kernels.iter_mut().find(|(known, _)| *known == kernel.name) {
                 Some((_, sum)) => *sum += time,
                 None => report.kernels.push((kernel.name, time)),
@@ -115,31 +111,19 @@ impl Session {
         Ok(())
     }
 
-    /// Submits copies to a staging buffer of this number of bytes.
-    fn fetch(
+    /// Waits for copies, and gives the bytes to `take` where they lie.
+    pub(super) async fn receive<T>(
         &mut self,
-        staging: BufferId,
-        bytes: u64,
-        copy: impl FnOnce(&Storage, &mut wgpu::CommandEncoder, &wgpu::Buffer),
-    ) -> Result<Fetch, GpuError> {
-        self.storage.ensure(staging, bytes)?;
-        let mut encoder = self.device.encoder();
-        copy(&self.storage, &mut encoder, self.storage.get(staging));
-        self.found.report.downloaded += bytes;
-        Ok(Fetch { staging, bytes, submission: self.device.submit(encoder) })
-    }
-
-    /// Waits for copies. Returns the bytes where they lie.
-    pub(super) async fn receive(&mut self, fetch: Fetch) -> Result<Mapped, GpuError> {
-        let mut clock = Clock::start();
-        let Fetch { staging, bytes, submission } = fetch;
-        let patience = self.options.patience.saturating_mul(std::mem::take(&mut self.submissions).max(1));
-        let staging = self.storage.get(staging);
-        wait::map(&self.device, staging, bytes, submission, patience).await?;
-        let received = Mapped::new(&self.device, staging, bytes)?;
+        Fetch { staging, bytes, submission }: Fetch,
+        take: impl FnOnce(&mut Self, &[u8]) -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
+        let (mut clock, device) = (Clock::start(), self.storage.device.clone());
+        let submissions = std::mem::take(&mut self.submissions).max(1);
+        let patience = self.storage.options.patience.saturating_mul(submissions);
+        wait::map(&device, &staging, bytes, submission, patience).await?;
         let report = &mut self.found.report;
         report.wait += clock.lap();
-        report.waits += 1;
-        Ok(received)
+        (report.waits, report.downloaded) = (report.waits + 1, report.downloaded + bytes);
+        device.read(&staging, bytes, |bytes| take(self, bytes))?
     }
 }

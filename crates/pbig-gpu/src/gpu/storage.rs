@@ -4,17 +4,14 @@
 use super::GpuError;
 use super::gpu_device::{GpuDevice, KernelId, id_of};
 use crate::GpuOptions;
-use crate::layout::{BOX_BITS, Chunk, DeviceBox, halves};
+use crate::layout::{BOX_BYTES, Chunk, halves};
+use crate::policy::MAX_BOXES;
 use bytemuck::Pod;
 use pbig_core::internal::{self as parallel, threads_for};
 use pbig_shaders::{Buffer, Kernel};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Maximum number of boxes of one cell: their work items, 2^17 rows by 2^17 / 8 groups of 8 columns, fit 32 bits.
-const MAX_BOXES_PER_CELL: u64 = 1 << 25;
-const _: () = assert!(MAX_BOXES_PER_CELL <= 1 << BOX_BITS, "an entry names each box");
 
 /// Calls after which a buffer is freed if none of them used a quarter of it.
 const CALLS_PER_WINDOW: u32 = 64;
@@ -59,13 +56,11 @@ impl BufferId {
         match self {
             Self::Staging(_) => Usage::MAP_READ | Usage::COPY_DST,
             Self::UploadStaging(_) => Usage::MAP_WRITE | Usage::COPY_SRC,
-            Self::Bound(Buffer::Dispatches) => Usage::STORAGE | Usage::INDIRECT,
-            Self::Bound(Buffer::LongRows) => Usage::STORAGE | Usage::INDIRECT | Usage::COPY_DST,
-            Self::Bound(Buffer::PairCount) => {
+            Self::Bound(buffer) if buffer.is_uniform() => Usage::UNIFORM | Usage::COPY_DST,
+            Self::Bound(Buffer::Dispatches | Buffer::LongRows | Buffer::PairCount) => {
                 Usage::STORAGE | Usage::INDIRECT | Usage::COPY_DST | Usage::COPY_SRC
             }
-            Self::Bound(buffer) if buffer.is_uniform() => Usage::UNIFORM | Usage::COPY_DST,
-            Self::Bound(..) => Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC,
+            Self::Bound(_) => Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC,
         }
     }
 }
@@ -79,14 +74,20 @@ struct KeptBuffer {
     is_mapped: Arc<AtomicBool>,
 }
 
+/// Bytes that are on their way to a staging buffer.
+pub(super) struct Fetch {
+    pub(super) staging: wgpu::Buffer,
+    pub(super) bytes: u64,
+    pub(super) submission: wgpu::SubmissionIndex,
+}
+
 /// The buffers of a finder.
 #[derive(Debug)]
 pub(super) struct Storage {
     pub(super) device: Arc<GpuDevice>,
+    pub(super) options: GpuOptions,
     /// Largest size of a buffer, in bytes.
     pub(super) max_buffer_bytes: u64,
-    /// Largest size of all buffers together, in bytes.
-    max_total_bytes: u64,
     buffers: HashMap<BufferId, KeptBuffer>,
     /// Bind groups of the present buffers.
     bind_groups: HashMap<KernelId, wgpu::BindGroup>,
@@ -94,27 +95,39 @@ pub(super) struct Storage {
 }
 
 impl Storage {
-    pub(super) fn new(device: Arc<GpuDevice>, options: &GpuOptions) -> Self {
+    pub(super) fn new(device: &Arc<GpuDevice>, options: &GpuOptions) -> Self {
+        let limits = device.handle.limits();
+        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         Self {
-            max_buffer_bytes: device.max_buffer_bytes(options),
-            max_total_bytes: options.max_total_bytes,
-            device,
+            max_buffer_bytes: most.min(options.max_bytes.max(1 << 20)) / 256 * 256,
+            options: *options,
+            device: device.clone(),
             buffers: HashMap::new(),
             bind_groups: HashMap::new(),
             calls: 0,
         }
     }
 
-    /// Returns the most boxes that fit every buffer.
-    pub(super) fn max_boxes(&self) -> u64 {
-        (self.max_buffer_bytes / size_of::<DeviceBox>() as u64).min(MAX_BOXES_PER_CELL)
+    /// Returns true if this was made for a device and options.
+    pub(super) fn suits(&self, device: &Arc<GpuDevice>, options: &GpuOptions) -> bool {
+        Arc::ptr_eq(&self.device, device) && self.options == *options
+    }
+
+    /// Returns an error if so many boxes do not fit every buffer.
+    pub(super) fn check_boxes(&self, boxes: u64) -> Result<(), GpuError> {
+        let most = (self.max_buffer_bytes / BOX_BYTES).min(MAX_BOXES);
+        let why = || format!("{boxes} boxes, but the device or GpuOptions::max_bytes allows {most}");
+        if boxes <= most { Ok(()) } else { Err(GpuError::Declined(why())) }
     }
 
     /// Makes a buffer at least `bytes` long. A buffer that has to grow loses its content.
     pub(super) fn ensure(&mut self, id: impl Into<BufferId>, bytes: u64) -> Result<(), GpuError> {
         let (id, limit) = (id.into(), self.max_buffer_bytes);
         if bytes > limit {
-            return Err(GpuError::too_large(id.name(), bytes, limit));
+            let what = id.name();
+            return Err(GpuError::Declined(format!(
+                "the buffer {what} needs {bytes} bytes, but the device or GpuOptions::max_bytes allows {limit}"
+            )));
         }
         let bytes = bytes.max(MIN_BUFFER_BYTES);
         if let Some(kept) = self.buffers.get_mut(&id).filter(|kept| kept.buffer.size() >= bytes) {
@@ -129,14 +142,13 @@ impl Storage {
         self.check_total(id, size)?;
         let is_mapped = matches!(id, BufferId::UploadStaging(_));
         let buffer = self.device.buffer(id.name(), size, id.usage(), is_mapped);
-        let is_mapped = Arc::new(AtomicBool::new(is_mapped));
-        self.buffers.insert(id, KeptBuffer { buffer, used: bytes, is_mapped });
+        self.buffers.insert(id, KeptBuffer { buffer, used: bytes, is_mapped: Arc::new(is_mapped.into()) });
         Ok(())
     }
 
     /// Returns an error if a buffer of this size would exceed the limit of all together.
     fn check_total(&self, id: BufferId, size: u64) -> Result<(), GpuError> {
-        let (bytes, limit, what) = (self.bytes() + size, self.max_total_bytes, id.name());
+        let (bytes, limit, what) = (self.bytes() + size, self.options.max_total_bytes, id.name());
         if bytes <= limit {
             return Ok(());
         }
@@ -182,15 +194,8 @@ impl Storage {
 
     /// Makes a uniform anew. Commands that were recorded keep the old one.
     pub(super) fn replace<T: Pod>(&mut self, uniform: Buffer, value: &T) -> Result<(), GpuError> {
-        let (id, bytes) = (BufferId::from(uniform), bytemuck::bytes_of(value));
-        let buffer = self.device.buffer(id.name(), bytes.len() as u64, id.usage(), true);
-        let mut view = buffer.get_mapped_range_mut(..).map_err(|_| self.device.give_up())?;
-        view.copy_from_slice(bytes);
-        drop(view);
-        buffer.unmap();
-        self.bind_groups.clear();
-        self.buffers.insert(id, KeptBuffer { buffer, used: bytes.len() as u64, is_mapped: Arc::default() });
-        Ok(())
+        self.buffers.remove(&uniform.into());
+        self.write(uniform, &[*value])
     }
 
     /// Makes the buffer of a list, and sends the list. Returns its bytes.
@@ -200,18 +205,22 @@ impl Storage {
         // Kernels bind it even if it is empty.
         self.ensure(buffer, bytes)?;
         if bytes > 0 {
-            let staging = self.stage(buffer, list)?;
-            let mut encoder = self.device.encoder();
-            encoder.copy_buffer_to_buffer(&staging, 0, self.get(buffer), 0, bytes);
+            let id = BufferId::UploadStaging(buffer);
+            self.stage(id, list)?;
+            let KeptBuffer { buffer: staging, is_mapped, .. } = &self.buffers[&id];
+            let (mut encoder, is_mapped) = (self.device.encoder(), is_mapped.clone());
+            encoder.copy_buffer_to_buffer(staging, 0, self.get(buffer), 0, bytes);
+            // A later wait maps it again.
+            encoder.map_buffer_on_submit(staging, wgpu::MapMode::Write, .., move |result| {
+                is_mapped.store(result.is_ok(), Ordering::Release);
+            });
             self.device.submit(encoder);
-            self.take_staging_back(buffer);
         }
         Ok(bytes)
     }
 
     /// Writes a list into its staging buffer: each thread writes pieces of it straight into mapped memory.
-    fn stage(&mut self, buffer: Buffer, list: &[u8]) -> Result<wgpu::Buffer, GpuError> {
-        let id = BufferId::UploadStaging(buffer);
+    fn stage(&mut self, id: BufferId, list: &[u8]) -> Result<(), GpuError> {
         // A call that failed has left the buffer to the device.
         if self.buffers.get(&id).is_some_and(|kept| !kept.is_mapped.load(Ordering::Acquire)) {
             self.buffers.remove(&id);
@@ -232,16 +241,20 @@ impl Storage {
         }
         kept.buffer.unmap();
         kept.is_mapped.store(false, Ordering::Relaxed);
-        Ok(kept.buffer.clone())
+        Ok(())
     }
 
-    /// Asks for the staging buffer of a list back once the device has made its copy: a later wait maps it.
-    fn take_staging_back(&self, buffer: Buffer) {
-        let kept = &self.buffers[&BufferId::UploadStaging(buffer)];
-        let is_mapped = kept.is_mapped.clone();
-        kept.buffer.map_async(wgpu::MapMode::Write, .., move |result| {
-            is_mapped.store(result.is_ok(), Ordering::Release);
-        });
+    /// Submits copies to a staging buffer of this number of bytes.
+    pub(super) fn fetch(
+        &mut self,
+        staging: BufferId,
+        bytes: u64,
+        copy: impl FnOnce(&Self, &mut wgpu::CommandEncoder, &wgpu::Buffer),
+    ) -> Result<Fetch, GpuError> {
+        self.ensure(staging, bytes)?;
+        let (staging, mut encoder) = (self.get(staging).clone(), self.device.encoder());
+        copy(self, &mut encoder, &staging);
+        Ok(Fetch { staging, bytes, submission: self.device.submit(encoder) })
     }
 
     pub(super) fn bind_group(

@@ -1,12 +1,11 @@
 //! For tests: a hook, single pipelines, plans.
 
 use super::gpu_device::lock;
-use super::passes::{Groups, Recording, Step};
-use super::readback::Mapped;
-use super::storage::{BufferId, Storage};
+use super::passes::{Groups, Step};
+use super::session::Session;
 use super::{GpuError, GpuFinder, GpuPlan, wait};
 use crate::GpuOptions;
-use crate::layout::{LANES, Params};
+use crate::layout::{Chunk, LANES, Params};
 use crate::pbig::Summary;
 use pbig_core::Aabb;
 use pbig_shaders::{Buffer, INDEX_PAIRS};
@@ -14,7 +13,7 @@ use std::sync::atomic::Ordering;
 
 /// Returns the kernels' parameters for a grid of the boxes with at most `max_cells` cells. Only what the plan sets is filled in.
 pub fn plan_params(boxes: &[Aabb], options: &GpuOptions, max_cells: u32) -> Params {
-    GpuPlan::new(&Summary::of(boxes), options, 1.0, max_cells).add_to(Params::default())
+    GpuPlan::new(&Summary::of(boxes), options.boxes_per_cell, 1.0, max_cells).params
 }
 
 impl GpuFinder {
@@ -43,21 +42,14 @@ impl GpuFinder {
     /// Returns the row that a device estimates for each of `count` indices of pairs of `n` boxes, and the pair that it computes.
     pub fn index_pairs(&self, n: u32, first: u32, count: u32) -> Result<Vec<[u32; 3]>, GpuError> {
         let device = self.device.as_ref().ok_or(GpuError::Lost)?;
-        let (mut storage, staging) = (Storage::new(device.clone(), &self.options), BufferId::Staging(0));
-        let bytes = 12 * u64::from(count);
+        let mut session = Session::new(device, &self.options);
+        session.params = Params { boxes: n, levels: first, cells: count, ..Params::default() };
+        let (bytes, groups) = (12 * u64::from(count), Groups::Direct(count.div_ceil(LANES)));
         wait::block_on(device.watch(async || {
-            let params = Params { boxes: n, levels: first, cells: count, ..Params::default() };
-            storage.write(Buffer::Params, &[params])?;
-            storage.ensure(Buffer::Out, bytes)?;
-            storage.ensure(staging, bytes)?;
-            let mut encoder = device.encoder();
-            let recording =
-                Recording { storage: &mut storage, encoder: &mut encoder, is_balanced: true, timer: None };
-            recording.record(&[Step::Run(&INDEX_PAIRS, Groups::Direct(count.div_ceil(LANES)))]);
-            let staging = storage.get(staging);
-            encoder.copy_buffer_to_buffer(storage.get(Buffer::Out), 0, staging, 0, bytes);
-            wait::map(device, staging, bytes, device.submit(encoder), self.options.patience).await?;
-            Ok(bytemuck::pod_collect_to_vec(&Mapped::new(device, staging, bytes)?))
+            session.storage.ensure(Buffer::Out, bytes)?;
+            session.submit(Chunk::default(), &[Step::Run(&INDEX_PAIRS, groups)])?;
+            let fetch = session.fetch_pairs(0..bytes, 0)?;
+            session.receive(fetch, |_, bytes| Ok(bytemuck::pod_collect_to_vec(bytes))).await
         }))
     }
 

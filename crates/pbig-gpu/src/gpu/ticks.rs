@@ -12,10 +12,12 @@ const EXPONENT_OF_ONE: i32 = 150;
 /// The size of a tick, and of a cell in ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ticks {
-    /// Binary logarithm of a tick, in the boxes' length unit.
-    exponent: i32,
+    /// Exponent in the bits of the floats whose last bit is a tick.
+    pub(super) exponent: i32,
     /// Number of cells in 2^16 ticks, at most 2^16.
     pub(super) cells_per_tick: u32,
+    /// Edge of a cell, in the boxes' length unit.
+    pub(super) cell: f64,
 }
 
 impl Ticks {
@@ -23,18 +25,9 @@ impl Ticks {
     pub(super) fn new(edge: f64, reach: f64) -> Self {
         let edge = edge.clamp(1e-30, 1e30);
         let exponent = (log2(edge) - TICKS_PER_CELL_LOG2).max(log2(reach) + 1 - REACH_LOG2);
-        let cells = f64::from(1 << 16) * power(exponent) / edge;
-        Self { exponent, cells_per_tick: cells.min(f64::from(1 << 16)) as u32 }
-    }
-
-    /// Returns the edge of a cell, in the boxes' length unit.
-    pub(super) fn cell(&self) -> f64 {
-        power(self.exponent) * f64::from(1 << 16) / f64::from(self.cells_per_tick)
-    }
-
-    /// Returns the exponent in the bits of the floats whose last bit is a tick.
-    pub(super) fn exponent_bits(&self) -> i32 {
-        self.exponent + EXPONENT_OF_ONE
+        let ticks = f64::from(1 << 16) * power(exponent);
+        let cells_per_tick = (ticks / edge).min(f64::from(1 << 16)) as u32;
+        Self { exponent: exponent + EXPONENT_OF_ONE, cells_per_tick, cell: ticks / f64::from(cells_per_tick) }
     }
 }
 
@@ -56,10 +49,10 @@ mod tests {
     fn cells_are_hardly_larger_than_wanted_unless_the_world_reaches_far() {
         for edge in [1e-30, 0.3, 1.0, 7.0, 1e30] {
             for reach in [0.0, edge, 1e6 * edge, 6e7 * edge] {
-                let cell = Ticks::new(edge, reach).cell();
+                let cell = Ticks::new(edge, reach).cell;
                 assert!((edge..1.001 * edge).contains(&cell), "{cell}, not {edge}, within {reach}");
             }
-            let cell = Ticks::new(edge, 1e10 * edge).cell();
+            let cell = Ticks::new(edge, 1e10 * edge).cell;
             assert!((18.0..38.0).contains(&(cell / edge)), "{cell}: the end is 2^28 to 2^29 cells away");
         }
     }

@@ -19,7 +19,7 @@ pub(super) struct Timer {
 impl Timer {
     /// Makes a timer if times are wanted: some drivers allow about 32 query sets in all.
     pub(super) fn new(device: &GpuDevice, options: &GpuOptions) -> Option<Self> {
-        if !device.has_timestamps || !options.time_kernels {
+        if !options.time_kernels || !device.handle.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return None;
         }
         let (label, ty, count) = (Some("times"), wgpu::QueryType::Timestamp, 2 * MOST_TIMED);

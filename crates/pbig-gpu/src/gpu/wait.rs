@@ -33,10 +33,9 @@ pub(super) async fn map(
 }
 
 impl GpuDevice {
-    /// Lets wgpu call back for what the device has done. wgpu panics if the driver reports a lost device.
+    /// Lets wgpu call back for what the device has done.
     pub(super) fn poll_now(&self) {
-        let poll = || self.handle.poll(wgpu::PollType::Poll);
-        if !matches!(catch_unwind(AssertUnwindSafe(poll)), Ok(Ok(_))) {
+        if self.poll(wgpu::PollType::Poll).is_err() {
             self.give_up();
         }
     }
@@ -49,14 +48,14 @@ impl GpuDevice {
     pub(super) fn is_idle_within(&self, limit: Duration) -> bool {
         let scope = self.handle.push_error_scope(wgpu::ErrorFilter::Validation);
         let submission = self.queue.submit([self.encoder().finish()]);
-        let finished = self.poll(submission, limit).is_ok();
+        let finished = self.poll(wait_for(submission, limit)).is_ok();
         let refused = pollster::block_on(scope.pop()).is_some();
         finished && !refused
     }
 
     /// Waits for a submission, at most for `patience`.
     fn wait(&self, submission: wgpu::SubmissionIndex, patience: Duration) -> Result<(), GpuError> {
-        match self.poll(submission, patience) {
+        match self.poll(wait_for(submission, patience)) {
             Ok(()) => Ok(()),
             Err(Some(wgpu::PollError::Timeout)) => {
                 self.give_up();
@@ -70,20 +69,19 @@ impl GpuDevice {
         }
     }
 
-    /// Waits. Returns `Err(None)` if wgpu panicked, as it does when the driver reports a lost device.
-    fn poll(
-        &self,
-        submission: wgpu::SubmissionIndex,
-        patience: Duration,
-    ) -> Result<(), Option<wgpu::PollError>> {
-        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(patience) };
+    /// Returns `Err(None)` if wgpu panicked, as it does when the driver reports a lost device.
+    fn poll(&self, how: wgpu::PollType) -> Result<(), Option<wgpu::PollError>> {
         let poll = || {
             lock(&self.hook)(&self.handle);
-            self.handle.poll(wait)
+            self.handle.poll(how)
         };
         match catch_unwind(AssertUnwindSafe(poll)) {
             Ok(polled) => polled.map(|_| ()).map_err(Some),
             Err(_) => Err(None),
         }
     }
+}
+
+fn wait_for(submission: wgpu::SubmissionIndex, limit: Duration) -> wgpu::PollType {
+    wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(limit) }
 }

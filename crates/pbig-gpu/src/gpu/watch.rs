@@ -1,33 +1,18 @@
 //! Errors that wgpu reports while a call is in progress.
 
-use super::GpuError;
 use super::gpu_device::{GpuDevice, lock};
-use std::sync::atomic::Ordering;
-
-/// A call in progress.
-struct Entered<'a>(&'a GpuDevice);
-
-impl Drop for Entered<'_> {
-    fn drop(&mut self) {
-        self.0.is_in_call.store(false, Ordering::Relaxed);
-    }
-}
+use super::{GpuError, wait};
 
 impl GpuDevice {
-    /// Begins a call. The calls of a page share one stack of error scopes, so a second one has to wait. Each thread of a program has its
-    /// own.
-    fn enter(&self) -> Result<Entered<'_>, GpuError> {
-        let is_busy = self.is_in_call.swap(true, Ordering::Relaxed);
-        if is_busy && cfg!(target_arch = "wasm32") { Err(GpuError::Busy) } else { Ok(Entered(self)) }
-    }
-
     /// Runs `work`, and returns errors that wgpu reports meanwhile.
     pub(super) async fn watch<T>(
         &self,
         work: impl AsyncFnOnce() -> Result<T, GpuError>,
     ) -> Result<T, GpuError> {
         use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
-        let _entered = self.enter()?;
+        // The calls of a page share one stack of error scopes. Each thread of a program has its own.
+        #[cfg(target_arch = "wasm32")]
+        let _in_call = self.in_call.try_lock().map_err(|_| GpuError::Busy)?;
         // Three variables, because a future that is dropped must end the innermost scope first.
         let outer = self.handle.push_error_scope(Validation);
         let middle = self.handle.push_error_scope(OutOfMemory);
@@ -50,16 +35,9 @@ impl GpuDevice {
         }
     }
 
-    /// Runs `work`, and returns errors that wgpu reports meanwhile.
-    #[cfg(not(target_arch = "wasm32"))]
+    /// Runs `work`, and returns errors that wgpu reports meanwhile. A page is told of them by its browser: it cannot wait for them.
     pub(super) fn watch_now<T>(&self, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
-        super::wait::block_on(self.watch(async || work()))
-    }
-
-    /// Runs `work`. The page is told of errors, and cannot wait for them.
-    #[cfg(target_arch = "wasm32")]
-    pub(super) fn watch_now<T>(&self, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
-        work()
+        if cfg!(target_arch = "wasm32") { work() } else { wait::block_on(self.watch(async || work())) }
     }
 }
 
