@@ -128,7 +128,7 @@ step_wasm() {
 # The examples that no document runs (see step_docs), at a size that takes seconds.
 step_examples() {
     step cargo run --release --example falling_objects -- --bodies 500 --steps 60
-    for example in existing_app debug_render boxes_events cloth other_device; do
+    for example in existing_app debug_render cloth other_device; do
         step cargo run --release --example "$example"
     done
     step cargo run --release --bin pbig -- simulate --scene pile --check --backend gpu --bodies 1500 --steps 20
