@@ -28,7 +28,7 @@ pub(super) const TABLES: &[Table] = &[
             ("motion", "drift|fall|jump|rest and burst|changing shares|few|churn"),
             ("boxes", "100000"), ("density", "dense"), ("threads", "2"), ("side", "ours")],
         columns: &[("motion", "motion"), ("mean", "mean_ms"), ("p99", "p99_ms"), ("worst", "worst_ms")] },
-    Table { name: "hard-searches", csv: "hard-searches",
+    Table { name: "hard", csv: "hard",
         rows: &[
             ("world", "uniform|two scales|mixed sizes above 2^100|needles in three directions|sheets in three directions"),
             ("boxes", "25000")],
