@@ -4,10 +4,10 @@
 use crate::trees::{Kept, Parry, Refit, partition};
 use crate::{UNLIMITED, UNSORTED};
 use pbig_core::Finder;
-use pbig_harness::bench::figures;
 use pbig_harness::chart::{Chart, Line, Plot};
 use pbig_harness::motions::{Density, Motion, MovingBoxes};
 use pbig_harness::prelude::*;
+use pbig_harness::runner::Summary;
 
 /// All sides; the second is ours on one thread.
 const NAMES: [&str; 4] = ["ours", "ours", "search from nothing", "parry 0.31"];
@@ -128,7 +128,8 @@ fn plot(title: &str, times: &[Vec<f64>]) -> Plot {
 }
 
 fn row([motion, density, side]: [&str; 3], [boxes, threads]: [usize; 2], ms: &[f64], table: &mut Table) {
-    table.row(cells![motion, density, boxes, threads, side, ms.len() - 1, ..figures(ms)]);
+    let Summary { mean, median, p99, max } = Summary::of(ms[1..].iter().copied());
+    table.row(cells![motion, density, boxes, threads, side, ms.len() - 1, mean, median, p99, max, ms[0]]);
 }
 
 #[cfg(test)]

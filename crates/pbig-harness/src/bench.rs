@@ -2,7 +2,7 @@
 
 use crate::cells;
 use crate::output::Failure;
-use crate::runner::{Spread, Summary, milliseconds};
+use crate::runner::{Spread, milliseconds};
 use crate::table::Value;
 use std::time::{Duration, Instant};
 
@@ -129,24 +129,9 @@ pub fn timed<T>(call: impl FnOnce() -> T) -> (T, f64) {
     (result, milliseconds(clock.elapsed()))
 }
 
-/// Returns mean, median, 99th percentile and maximum of all frames but the first, and the first; zeros for none.
-pub fn figures(ms: &[f64]) -> [f64; 5] {
-    let Some((&first, rest)) = ms.split_first() else { return [0.0; 5] };
-    let Summary { mean, median, p99, max } = Summary::of(rest.iter().copied());
-    [mean, median, p99, max, first]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn figures_by_hand() {
-        assert_eq!(figures(&[9.0, 1.0, 2.0, 6.0]), [3.0, 2.0, 6.0, 6.0, 9.0]);
-        let many: Vec<f64> = std::iter::once(0.0).chain((1..=200).map(f64::from)).collect();
-        assert_eq!(figures(&many)[2..4], [198.0, 200.0]);
-        assert_eq!(figures(&[5.0]), [0.0, 0.0, 0.0, 0.0, 5.0]);
-    }
 
     #[test]
     fn places_in_a_round_favour_no_side() {
