@@ -2,6 +2,7 @@
 
 use pbig_core::{Aabb, BroadPhase, Config, Finder, ProxyFilter};
 use pbig_harness::counting::{held, peak, requests};
+use pbig_tests::on_threads;
 
 const BOXES: u32 = 60_000;
 
@@ -21,13 +22,9 @@ fn step(broad_phase: &mut BroadPhase, update: u32, is_clump: bool) {
     broad_phase.update().expect("few enough pairs");
 }
 
-fn on_one_thread(work: impl FnOnce() + Send) {
-    rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool").install(work);
-}
-
 #[test]
 fn an_update_gives_back_what_a_clump_has_left() {
-    on_one_thread(|| {
+    on_threads(1, || {
         let start = held();
         let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("no margin");
         (0..10).for_each(|update| step(&mut broad_phase, update, false));
@@ -54,7 +51,7 @@ fn an_update_gives_back_what_a_clump_has_left() {
 /// Boxes that were added once and sleep keep what a search for their pairs needs. Removed boxes leave only their ids.
 #[test]
 fn memory_comes_back_without_changes_and_without_boxes() {
-    on_one_thread(|| {
+    on_threads(1, || {
         let start = held();
         let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("no margin");
         step(&mut broad_phase, 0, true);
@@ -84,7 +81,7 @@ fn memory_comes_back_without_changes_and_without_boxes() {
 
 #[test]
 fn updates_in_a_steady_state_ask_for_no_memory() {
-    on_one_thread(|| {
+    on_threads(1, || {
         let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("no margin");
         // To and fro, so that no list grows any more.
         (0..40).for_each(|update| step(&mut broad_phase, update % 2, false));
@@ -97,7 +94,7 @@ fn updates_in_a_steady_state_ask_for_no_memory() {
 
 #[test]
 fn a_clone_copies_no_scratch() {
-    on_one_thread(|| {
+    on_threads(1, || {
         let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("no margin");
         (0..4).for_each(|update| step(&mut broad_phase, update, true));
         let start = held();
@@ -115,7 +112,7 @@ fn a_clone_copies_no_scratch() {
 
 #[test]
 fn a_finder_shrinks_to_its_lists() {
-    on_one_thread(|| {
+    on_threads(1, || {
         let boxes: Vec<Aabb> = (0..BOXES).map(|id| cube(id, 0, true)).collect();
         let start = held();
         let mut finder = Finder::default();

@@ -1,5 +1,6 @@
 //! Contract: a device that fails or is lost at any moment costs no pair and no event.
 
+use super::resident::App;
 use super::{Hardware, find, on_cpu, set, with_device};
 use pbig_core::{
     Backend, BroadPhase, Config, DeviceFailure, DeviceFound, Finder, PairDevice, SearchRequest, oracle,
@@ -120,10 +121,7 @@ fn a_hung_device_costs_the_patience_once() {
 #[test]
 fn an_apps_device_that_was_busy_is_used_again_when_it_is_idle() {
     needs_gpu!();
-    let adapter = adapters().into_iter().next().expect("an adapter");
-    let device = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()));
-    let (device, queue) = device.expect("a device with WebGPU's default limits");
-    let finder = GpuFinder::from_device(device, queue).expect("default limits are enough");
+    let App { finder, .. } = App::new(GpuOptions::DEFAULT);
     let config = Config { backend: Backend::Device, ..Config::DEFAULT };
     let usual = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
     let no_time = GpuOptions { patience: Duration::ZERO, ..usual };
@@ -143,9 +141,7 @@ fn an_apps_device_that_was_busy_is_used_again_when_it_is_idle() {
 fn an_app_shares_its_device_and_a_lost_one_is_not_replaced() {
     needs_gpu!();
     let adapter = adapters().into_iter().next().expect("an adapter");
-    let device = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()));
-    let (device, queue) = device.expect("a device with WebGPU's default limits");
-    let finder = GpuFinder::from_device(device.clone(), queue).expect("default limits are enough");
+    let App { device, finder, .. } = App::on(&adapter, GpuOptions::DEFAULT);
     assert!(finder.adapter().contains(&adapter.get_info().name), "{}", finder.adapter());
     let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
     let mut finder = with_device(options, finder);

@@ -14,18 +14,18 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt, DownloadBuffer};
 const MOST_CALLS: usize = 6;
 
 /// An app with a device of its own, which the finder shares.
-struct App {
-    device: wgpu::Device,
+pub(super) struct App {
+    pub(super) device: wgpu::Device,
     queue: wgpu::Queue,
-    finder: GpuFinder,
+    pub(super) finder: GpuFinder,
 }
 
 impl App {
-    fn new(options: GpuOptions) -> Self {
+    pub(super) fn new(options: GpuOptions) -> Self {
         Self::on(&adapters().into_iter().next().expect("an adapter"), options)
     }
 
-    fn on(adapter: &wgpu::Adapter, options: GpuOptions) -> Self {
+    pub(super) fn on(adapter: &wgpu::Adapter, options: GpuOptions) -> Self {
         let device = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()));
         let (device, queue) = device.expect("a device with WebGPU's default limits");
         let finder =
