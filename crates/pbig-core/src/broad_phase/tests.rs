@@ -199,8 +199,8 @@ fn boxes_that_jump_are_searched_and_those_that_move_are_looked_up() {
     assert!(broad_phase.pairs().eq(oracle::pairs(broad_phase.fat_aabbs())));
 }
 
-/// Boxes that are set again and again, or come and go before an update; that are removed and set where they were; points, which
-/// are longer than nothing away wherever they move.
+/// Boxes that are set again and again, or come and go before an update; that are removed and set where they were; points, whose
+/// every move counts as a jump, because they have no edges.
 #[test]
 fn boxes_that_need_no_new_places_are_looked_up_whatever_is_done_with_them() {
     let n = 4000;

@@ -97,8 +97,9 @@ impl Tree {
         self.stale.lock().unwrap_or_else(PoisonError::into_inner).refreshed(world, false).0
     }
 
-    /// Returns how many of the changed boxes need new places in the tree: those that came and those that are no longer near others
-    /// that were near them when it was brought up to date. None do if there is no tree yet, so that there will be one.
+    /// Returns how many of the changed boxes need new places in the tree as it is: those that came, and those that are no longer near others
+    /// that were near them when it was brought up to date. After all have moved far away, all need one, and are searched until fewer
+    /// arrive or a query asks. None do if there is no tree yet, so that there will be one.
     pub(super) fn arrivals(&mut self, world: &World) -> usize {
         let is_fresh = self.fresh.get_mut().is_some();
         if is_fresh { 0 } else { self.stale_mut().index.arrivals(&world.boxes, &world.changed) }

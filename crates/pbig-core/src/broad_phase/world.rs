@@ -85,7 +85,7 @@ impl World {
         Part { first: 0, boxes, filters, states, changed, valid, arrived, is_filtered, is_noted: false }
     }
 
-    /// Does something with all boxes. The tree learns if one changes.
+    /// Runs a change on all boxes. The tree expires if one has changed.
     #[inline(always)]
     fn change<R>(&mut self, change: impl FnOnce(&mut Part<'_>) -> R) -> R {
         let mut all = self.all();
@@ -338,8 +338,8 @@ impl Part<'_> {
     }
 }
 
-/// Returns true if a box is new, or has jumped: the gap to its stored box is longer than four of this one's longest edges. All others need
-/// no new places in a tree, nearly always.
+/// Returns true if a box is new, or has jumped: the gap to its stored box is more than four times the longest edge of the stored one. Others
+/// hardly ever need a new place in a tree.
 #[inline(always)]
 fn has_arrived(stored: &Aabb, now: &Aabb) -> bool {
     let edge = |k: usize| stored.max[k] - stored.min[k];

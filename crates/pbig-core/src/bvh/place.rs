@@ -11,7 +11,7 @@ use crate::simd::{Simd, dispatch};
 const TRIES: usize = 3;
 
 impl BoxIndex {
-    /// Returns how many of some boxes came or have jumped: these need new places.
+    /// Returns how many of some boxes have no place, or no longer meet the node above their leaf: these need new places.
     pub(crate) fn arrivals(&self, boxes: &[Aabb], ids: &[u32]) -> usize {
         let place = |id: u32| self.places.get(id as usize).copied().unwrap_or(NONE);
         let aabb = |id: u32| boxes.get(id as usize).filter(|aabb| aabb.is_valid());
@@ -107,7 +107,6 @@ impl BoxIndex {
             self.nodes.len() - 1
         });
         self.put(at, id, aabb);
-        self.bounds[at] = self.bounds[at].union(aabb);
     }
 
     /// Puts a box into the first free lane of a leaf. The bounds do not know it yet.
@@ -152,13 +151,16 @@ impl BoxIndex {
     }
 
     /// Returns the leaf with room below a child of a node: always the child that grows least. There is none if the leaf would become larger
-    /// than twice the node above it.
+    /// than twice the node above it that has boxes.
     #[inline(always)]
     fn leaf_below(&self, simd: impl Simd, node: usize, lane: usize, aabb: &Aabb) -> Option<usize> {
         let (mut above, mut at) = (node, self.nodes[node].children[lane] as usize);
         while !self.is_leaf(at as u32) {
             let lane = self.least_growing(simd, &self.nodes[at], aabb, 0)?;
-            (above, at) = (at, self.nodes[at].children[lane] as usize);
+            if self.bounds[at].is_valid() {
+                above = at;
+            }
+            at = self.nodes[at].children[lane] as usize;
         }
         let extent = extent_sum(&self.bounds[at].union(aabb));
         let is_small = extent <= policy::bvh::GROWN_TO * extent_sum(&self.bounds[above]);

@@ -15,8 +15,10 @@ const PIECE: usize = 256;
 /// Leaves between the one that is read and the one whose boxes are asked for.
 const READ_AHEAD: usize = 3;
 
-/// Boxes whose memory is never given back, and how many times the needed memory is a peak's.
+/// Number of boxes whose memory is never given back.
 const SMALL: usize = 8192;
+
+/// Minimum ratio of memory to what is needed for it to be given back.
 const PEAK: usize = 8;
 
 impl BoxIndex {
@@ -42,32 +44,35 @@ impl BoxIndex {
         present: impl Iterator<Item = u32> + Clone,
         is_for_look_ups: bool,
     ) -> usize {
+        let order = if is_for_look_ups { Order::ROOMY } else { Order::SORTED };
         let mut read = 0;
         if self.end > 0 {
-            read = self.update(boxes, changed, present.clone());
-            let have_paid =
-                |nodes: u64| if is_for_look_ups { self.looked_up >= nodes } else { self.wants_sort() };
-            if !self.sort_after.is_some_and(have_paid) && !self.has_many_loose() {
+            read = self.update(boxes, changed, present.clone(), order);
+            let have_look_ups_paid = || self.sort_after.is_some_and(|nodes| self.looked_up >= nodes);
+            let has_paid = if is_for_look_ups { have_look_ups_paid() } else { self.wants_sort() };
+            if !has_paid && !self.has_many_loose() {
                 return read;
             }
         }
-        self.lay_out(boxes, present, if is_for_look_ups { Order::ROOMY } else { Order::SORTED });
+        self.lay_out(boxes, present, order);
         read + self.listed
     }
 
-    /// Reads the changed boxes, if they are few, or all. Returns the number of boxes that were read.
+    /// Reads the changed boxes, if they are few, or all; lays them out anew in an order if they hardly fit. Returns the number of boxes
+    /// that were read.
     fn update(
         &mut self,
         boxes: &[Aabb],
         changed: Option<&[u32]>,
         present: impl Iterator<Item = u32> + Clone,
+        order: Order,
     ) -> usize {
         self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
         let is_few = |changed: &&[u32]| changed.len() * policy::bvh::REFIT_SHARE < boxes.len();
         let few = changed.filter(is_few);
         match few {
             Some(changed) => self.place(boxes, changed),
-            None => self.refit(boxes, present),
+            None => self.refit(boxes, present, order),
         }
         self.known = boxes.len();
         self.plan_sort();
@@ -138,8 +143,8 @@ impl BoxIndex {
         }
     }
 
-    /// Returns true if sorting the boxes anew would pay: queries have looked at as many nodes as a sort costs, and the order is bad.
-    /// [`BoxIndex::refresh`] sorts then, too.
+    /// Returns true if sorting the boxes anew would pay: queries have looked at as many nodes as a sort costs if the order is bad, and at
+    /// some times as many if boxes have moved. [`BoxIndex::refresh`] sorts then, too.
     #[inline]
     pub fn wants_sort(&self) -> bool {
         self.sort_after.is_some_and(|nodes| self.looked_at.0.load(Ordering::Relaxed) >= nodes)
@@ -148,10 +153,10 @@ impl BoxIndex {
     /// Chooses the number of nodes that queries look at before the next sort: as many as one sort costs if the order is bad, some
     /// more if boxes have moved, and no number if the order is as after a sort.
     fn plan_sort(&mut self) {
-        let has_many_loose =
+        let has_some_loose =
             policy::bvh::FEW_LOOSE_SHARE * self.loose().len() > policy::bvh::loose_leaves(self.leaves);
         let has_grown = self.grown * policy::bvh::GROWN_SHARE > self.end as usize;
-        let is_bad = has_many_loose || has_grown;
+        let is_bad = has_some_loose || has_grown;
         let one = policy::bvh::nodes_for_sort(self.leaves, self.listed);
         self.sort_after = match (is_bad, self.has_moved) {
             (true, _) => Some(one),
@@ -176,18 +181,18 @@ impl BoxIndex {
         self.lay_out(boxes, 0..boxes.len() as u32, Order { split, ..Order::SORTED });
     }
 
-    fn refit(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32> + Clone) {
+    fn refit(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32> + Clone, order: Order) {
         self.read_all(boxes);
         // After a peak, most leaves are empty.
         let full = self.bounds[..self.leaves as usize].iter().filter(|bounds| bounds.is_valid()).count();
         if policy::bvh::FULL_LEAVES_SHARE * full < self.leaves as usize {
-            return self.lay_out(boxes, present, Order::SORTED);
+            return self.lay_out(boxes, present, order);
         }
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         let has_come = |id: &u32| self.places[*id as usize] == NONE && boxes[*id as usize].is_valid();
         let came: Vec<u32> = present.clone().filter(has_come).collect();
         if came.len() > LANES * policy::bvh::loose_leaves(self.leaves) {
-            return self.lay_out(boxes, present, Order::SORTED);
+            return self.lay_out(boxes, present, order);
         }
         self.place(boxes, &came);
     }

@@ -145,10 +145,10 @@ fn sort_by_place(entries: &mut [Entry], leaf: usize, others: &Others) {
     }
 }
 
-/// Moves the boxes with the least centers on an axis to the front, as many as there are before a place.
-fn part_at(entries: &mut [Entry], place: usize, axis: usize) {
+/// Moves the boxes with the least centers on an axis before the middle.
+fn part_at(entries: &mut [Entry], middle: usize, axis: usize) {
     let Ok(all) = ArrayVec::<Entry, MAX_SORTED>::try_from(&*entries) else {
-        entries.select_nth_unstable_by(place, |a, b| a.center[axis].total_cmp(&b.center[axis]));
+        entries.select_nth_unstable_by(middle, |a, b| a.center[axis].total_cmp(&b.center[axis]));
         return;
     };
     let word = |(i, entry): (u64, &Entry)| u64::from(ordered(entry.center[axis])) << 32 | i;
@@ -271,7 +271,7 @@ struct Measure {
 }
 
 impl Measure {
-    /// Four lanes, of which the last is no axis, become vectors.
+    /// The fourth lane is no axis: four become a vector.
     #[inline(always)]
     fn of(_: impl Simd, entries: &[Entry]) -> Self {
         let (mut low, mut high) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);

@@ -308,21 +308,36 @@ fn boxes_that_come_find_the_room_of_those_that_went() {
     }
 }
 
-/// A leaf that has become empty takes the next boxes there.
+/// A leaf that has become empty takes the next boxes there, and so do all leaves of a node.
 #[test]
 fn boxes_that_go_and_come_back_find_their_empty_leaves() {
     let boxes = scattered(3000);
-    let (mut index, mut without) = (BoxIndex::default(), boxes.clone());
-    index.refresh(&boxes, None);
-    for leaf in 0..index.leaves as usize / 4 {
-        let ids: Vec<u32> = index.nodes[leaf].children.iter().copied().filter(|id| *id != NONE).collect();
-        ids.iter().for_each(|id| without[*id as usize] = Aabb::NOWHERE);
-        index.refresh(&without, Some(&ids));
-        ids.iter().for_each(|id| without[*id as usize] = boxes[*id as usize]);
-        index.refresh(&without, Some(&ids));
-        check_form(&index, &without);
+    for together in [1, LANES] {
+        let (mut index, mut some) = (BoxIndex::default(), boxes.clone());
+        index.refresh(&boxes, None);
+        for first in (0..index.leaves as usize / 3).step_by(LANES) {
+            let leaves = &index.nodes[first..first + together];
+            let ids: Vec<u32> =
+                leaves.iter().flat_map(|leaf| leaf.children).filter(|id| *id != NONE).collect();
+            ids.iter().for_each(|id| some[*id as usize] = Aabb::NOWHERE);
+            index.refresh(&some, Some(&ids));
+            ids.iter().for_each(|id| some[*id as usize] = boxes[*id as usize]);
+            index.refresh(&some, Some(&ids));
+            check_form(&index, &some);
+        }
+        assert!(index.loose().is_empty(), "{} leaves outside the tree", index.loose().len());
     }
-    assert!(index.loose().is_empty(), "{} leaves outside the tree", index.loose().len());
+}
+
+/// Many boxes came, and the tree is laid out anew: the next ones find room.
+#[test]
+fn a_layout_for_look_ups_leaves_room() {
+    let (mut index, mut boxes) = (BoxIndex::default(), scattered(2000));
+    index.refresh_present(&boxes, None, 0..2000, true);
+    boxes.extend(scattered(6000));
+    index.refresh_present(&boxes, None, 0..8000, true);
+    let full = index.room[..index.leaves as usize].iter().filter(|room| **room == 0).count();
+    assert!(full < 10, "{full} of {} leaves are full", index.leaves);
 }
 
 /// Boxes that come after a sort make queries slow only until these have paid for the next one.

@@ -9,7 +9,7 @@ const LOOK_UP_TO_ONE_IN: [(usize, usize); 3] = [(512, 2), (16_384, 5), (usize::M
 const LOOK_UP_FROM_BOXES: usize = 16;
 
 /// Maximum number of nodes looked at and boxes met in look-ups, for each box of the world. A node counts as nine in the work: look-ups
-/// that are given up take at most 64 more for each box than a search.
+/// that are given up take at most 54 for each box, besides the tree's upkeep.
 const LOOK_UP_TO_NODES_PER_BOX: u64 = 6;
 
 /// Maximum share of present boxes among all ids, as one in this number, for a search to list them: copying a box takes about as
@@ -23,7 +23,7 @@ const MAX_WITHOUT: u32 = 16;
 /// Maximum share of boxes that came or have jumped, as one in this number: a place takes as long as two look-ups.
 const PLACE_ONE_IN: usize = 32;
 
-/// A number of boxes that came or have jumped that finds places in any world.
+/// Maximum number of boxes that came or have jumped that get places in any world.
 const FEW_ARRIVALS: usize = 8;
 
 /// Smaller worlds may take as much work as one of this size.
