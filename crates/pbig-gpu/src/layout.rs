@@ -58,7 +58,7 @@ macro_rules! shared_structs {
 }
 
 shared_structs! {
-    /// Cells that a box touches at its level: the lowest ones; the level and the numbers of cells, or none.
+    /// Cells that a box touches at its level: the lowest ones; the level and the numbers of cells, or `u32::MAX`.
     Located { low: [i32; 3], shape: u32 }
     /// Cells of one size.
     Level { dims: [u32; 3], shift: u32, first_cell: u32, unused: [u32; 3] }

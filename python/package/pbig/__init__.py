@@ -24,7 +24,7 @@ def pairs(boxes: ArrayLike) -> Pairs:
     """Returns every pair of overlapping boxes.
 
     Boxes are closed: two that touch overlap. A box with a NaN, or a minimum above its maximum, pairs with nothing.
-    Extents may be infinite. Boxes in float64 are rounded outward to float32, so no pair is missed. A float32 array in C
+    Extents may be infinite. For a margin r give `boxes + [-r, -r, -r, r, r, r]`. Boxes in float64 are rounded outward to float32, so no pair is missed. A float32 array in C
     order is read in place: no other thread may write to it meanwhile.
 
     Args:
@@ -101,9 +101,9 @@ def mesh_pairs(
     """
     kinds = _checks.kinds(elements)
     before = _checks.vertices("vertices", vertices)
+    rows = _checks.faces(faces, len(before))
     later = before if after is None else _checks.vertices("after", after)
     _checks.same_count(before, later)
-    rows = _checks.faces(faces, len(before))
     found = _pbig.mesh_pairs((before, later), rows, _checks.margin(margin), [tuple(kind) for kind in kinds])
     return dict(zip(kinds, found))
 

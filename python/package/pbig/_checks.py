@@ -30,8 +30,10 @@ def boxes(name: str, values: ArrayLike) -> NDArray[Any]:
 def vertices(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Returns the places of vertices. Warns of those that are no places."""
     array = _array(name, values, 3)
+    if array.ndim == 0:
+        raise ValueError(f"{name} is one number; give vertices, shape (n, 3); a margin is given as margin={array}")
     if array.shape[1:] != (3,):
-        raise _wrong_shape(name, array, "(n, 3), with the xyz of a vertex in a row")
+        raise _wrong_shape(name, array, "(n, 3), with the xyz of a vertex in a row; in 2D add a column of zeros")
     _check_rows(name, array)
     _float_type(name, array)
     with np.errstate(invalid="ignore"):
@@ -51,6 +53,8 @@ def same_count(before: NDArray[np.float64], after: NDArray[np.float64]) -> None:
 def faces(values: ArrayLike, vertex_count: int) -> NDArray[np.uint32]:
     """Returns faces as rows of four vertices. A triangle has `NO_VERTEX` last. Warns of faces that name a vertex twice."""
     array = _array("faces", values, 3)
+    if array.shape[1:] == (2,):
+        raise _wrong_shape("faces", array, "(n, 3) or (n, 4): these are edges, which pbig takes from faces")
     if array.shape[1:] not in ((3,), (4,)):
         raise _wrong_shape("faces", array, "(n, 3) for triangles, or (n, 4) for quadrilaterals")
     rows = np.full((len(array), 4), NO_VERTEX, np.uint32)

@@ -1,7 +1,7 @@
 //! A headless bevy app whose physics use pbig: balls fall onto a ground, and every pair is checked.
 //!
 //! `scripts/patch-rapier.sh rapier-0.36`, then `cargo run --release --ignore-rust-version --manifest-path
-//! rapier-0.36/Cargo.toml -p pbig-bevy-example` (Rust 1.95).
+//! rapier-0.36/Cargo.toml -p pbig-bevy-example` (Rust 1.95 or newer).
 
 use bevy::prelude::*;
 use bevy::time::{TimePlugin, TimeUpdateStrategy};

@@ -30,7 +30,7 @@ const MAX_CELLS: u64 = 1 << 28;
 pub(super) struct Forecast {
     kept: Option<KeptPlan>,
     /// The plan was refused, or the boxes have outgrown it.
-    is_outdated: bool,
+    pub(super) is_outdated: bool,
     /// A new plan gets finer cells, because the last plan made too many tests for the boxes that it was made for.
     pub(super) is_finer: bool,
     /// Lengths of the lists of the last map.
@@ -96,6 +96,7 @@ impl Forecast {
         self.lists = *counters;
         let has_lists = passes::lists_fit(params, counters);
         self.is_outdated |= has_lists && kept.is_outgrown_after(counters);
+        self.is_finer &= !has_lists;
         has_lists
     }
 
@@ -129,7 +130,7 @@ impl Forecast {
         has_filters: bool,
     ) -> Result<Params, GpuError> {
         let mut params = self.without_capacities(storage, boxes, has_filters);
-        let first_bytes = storage.options.first_bytes * (u64::from(boxes) + EXTRA_BOXES);
+        let first_bytes = storage.options.first_bytes.saturating_mul(u64::from(boxes) + EXTRA_BOXES);
         let first_bytes = first_bytes.min(storage.max_buffer_bytes);
         if params.levels > 0 {
             passes::make_buffers(storage, &mut params, &self.lists, first_bytes)?;

@@ -147,7 +147,10 @@ impl Session {
             return Err(GpuError::TooManyPairs);
         }
         self.forecast.words = words;
-        Ok(words <= self.storage.size(Buffer::Out) / 4)
+        let has_fit = words <= self.storage.size(Buffer::Out) / 4;
+        // A repeat keeps the plan, and learns again that the boxes have outgrown it.
+        self.forecast.is_outdated &= has_fit;
+        Ok(has_fit)
     }
 
     fn too_many_tests(&self, counters: &Counters) -> GpuError {

@@ -115,9 +115,12 @@ impl Storage {
 
     /// Returns an error if so many boxes do not fit every buffer.
     pub(super) fn check_boxes(&self, boxes: u64) -> Result<(), GpuError> {
-        let most = (self.max_buffer_bytes / BOX_BYTES).min(MAX_BOXES);
-        let why = || format!("{boxes} boxes, but the device or GpuOptions::max_bytes allows {most}");
-        if boxes <= most { Ok(()) } else { Err(GpuError::Declined(why())) }
+        let fitting = (self.max_buffer_bytes / BOX_BYTES, "the device or GpuOptions::max_bytes");
+        let (most, who) = fitting.min((MAX_BOXES, "pbig"));
+        if boxes <= most {
+            return Ok(());
+        }
+        Err(GpuError::Declined(format!("{boxes} boxes, but {who} allows {most}")))
     }
 
     /// Makes a buffer at least `bytes` long. A buffer that has to grow loses its content.
