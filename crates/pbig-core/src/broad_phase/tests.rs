@@ -228,13 +228,10 @@ fn boxes_that_need_no_new_places_are_looked_up_whatever_is_done_with_them() {
     let points = |of: &mut BroadPhase, update: u32| {
         few(update).for_each(|id| set(of, id, at(id, 0.0, 0.01 * (update + 1) as f32)));
     };
-    let all: [(&str, f32, &dyn Fn(&mut BroadPhase, u32)); 4] = [
-        ("again", 1.0, &again),
-        ("for a moment", 1.0, &for_a_moment),
-        ("back", 1.0, &back),
-        ("points", 0.0, &points),
-    ];
-    for (name, edge, change) in all {
+    type Change<'a> = &'a dyn Fn(&mut BroadPhase, u32);
+    let changes: [Change<'_>; 4] = [&again, &for_a_moment, &back, &points];
+    let names = [("again", 1.0), ("for a moment", 1.0), ("back", 1.0), ("points", 0.0)];
+    for ((name, edge), change) in names.into_iter().zip(changes) {
         let mut broad_phase = BroadPhase::default();
         (0..n).for_each(|id| set(&mut broad_phase, id, at(id, edge, 0.0)));
         broad_phase.update().expect("few pairs");

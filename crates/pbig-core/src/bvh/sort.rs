@@ -107,7 +107,7 @@ pub(super) fn sort(entries: &mut [Entry], Order { split, leaf }: Order) -> Vec<R
 fn sort_by_class(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
     let Some(class) = entries.first().map(|entry| entry.class(split)) else { return Vec::new() };
     if entries.iter().all(|entry| entry.class(split) == class) {
-        return vec![0..entries.len()];
+        return std::iter::once(0..entries.len()).collect();
     }
     entries.sort_unstable_by_key(|entry| entry.class(split));
     let mut end = 0;
