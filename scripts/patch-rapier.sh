@@ -108,12 +108,14 @@ lines_to_remove() {
 }
 
 if $is_undo; then
+    did="There were no copies in $project/patched."
+    ! compgen -G "$project/patched/rapier[23]d*-$version" >/dev/null || did="Removed the copies in $project/patched."
     rm -rf "$project"/patched/rapier[23]d-"$version" "$project"/patched/rapier[23]d-f64-"$version"
     rmdir "$project/patched" 2>/dev/null || true
     lines="$(lines_to_remove)" || true
     [ -n "$lines" ] || lines="(no manifest names pbig's crates or a copy)"
     cat <<TEXT
-Removed the copies in $project/patched.
+$did
 Remove pbig's calls from the code, and these lines from the manifests, with [patch.crates-io] if nothing is left in it:
 
 $lines
@@ -196,7 +198,7 @@ $(for crate in $crates; do echo "$crate = \"=$version\""; done)
 [workspace]
 TOML
 # Run in the project, whose configuration of cargo counts.
-metadata="$(cd "$project" && cargo metadata --format-version 1 --manifest-path "$work/Cargo.toml")" ||
+metadata="$(cd "$project" && cargo metadata --quiet --format-version 1 --manifest-path "$work/Cargo.toml")" ||
     fail "cargo cannot fetch" $crates "$version"
 
 # make_copy CRATE: made aside and moved into place, so that no half-patched copy stays behind.
@@ -216,6 +218,12 @@ make_copy() {
         patch --quiet --forward --strip=1 --directory="$copy.new" <"$file" ||
             fail "the patch ${file##*/} does not apply to $origin: is it unchanged?"
     done
+    # One with new times would be compiled again.
+    if diff -rq "$copy.new" "$copy" >/dev/null 2>&1; then
+        rm -rf "$copy.new"
+        echo "$copy is as it should be."
+        return 0
+    fi
     rm -rf "$copy"
     mv "$copy.new" "$copy"
     echo "Made $copy."
