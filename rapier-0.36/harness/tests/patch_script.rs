@@ -215,9 +215,12 @@ fn the_copy_is_made_anew_and_removed_alone() {
     project.run(&[]).expect("success");
     assert!(has("src/geometry/broad_phase_bvh/pair_finder.rs", "PairFinder"));
     assert!(!has("src/data/graph.rs", "find_edge_visiting") && !project.copy().join("left").exists());
+    // A copy that is made anew is compiled anew.
+    project.prints("patched/rapier3d-0.36.1 is as it should be.", &[]);
     project.write("patched/mine", "");
     project.run(&["--undo"]).expect("success");
     assert!(!project.copy().exists() && project.folder().join("patched/mine").exists());
+    project.prints("There were no copies in PROJECT/patched.", &["--undo"]);
 }
 
 const IN_A_WORKSPACE: &str = "Add to PROJECT/Cargo.toml, the root of the workspace, unless it has them:
