@@ -30,7 +30,7 @@ impl LookUp {
             stage!("map");
             task.tree.refresh_for_look_ups(world)
         };
-        index.in_order(&world.changed, &mut self.order);
+        index.in_order(&world.noted.changed, &mut self.order);
         task.kept.make_backward();
         drop_pairs_of_removed(&world.removed, task.kept, &mut task.events.removed);
         task.report.stages.map += clock.lap();
@@ -50,7 +50,7 @@ impl LookUp {
         report.stages.check += clock.lap();
         report.checks = Checks { made, unnecessary: made - met, redundant: 0 };
         report.work += read as u64 + made + nodes + met;
-        report.set_plan(Plan { algorithm: Algorithm::LookUp, boxes: world.valid, ..Plan::default() });
+        report.set_plan(Plan { algorithm: Algorithm::LookUp, boxes: world.noted.valid, ..Plan::default() });
         task.tree.note_look_ups(nodes, budget.is_over());
         !budget.is_over()
     }
@@ -151,7 +151,7 @@ impl Thread {
     #[inline(always)]
     fn compare(&mut self, simd: impl Simd, world: &World, kept: &Kept, id: u32) {
         let (lower, later) = kept.rows_of(id);
-        if world.is_filtered {
+        if world.noted.is_filtered {
             let filter = &world.filters[id as usize];
             self.now.retain(|other| filter.allows(&world.filters[*other as usize]));
         }

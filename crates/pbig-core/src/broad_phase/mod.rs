@@ -207,7 +207,7 @@ impl BroadPhase {
     #[inline(always)]
     fn prefetch(&self, id: u32) {
         prefetch(self.world.boxes.as_ptr().wrapping_add(id as usize));
-        if self.world.is_filtered {
+        if self.world.noted.is_filtered {
             prefetch(self.world.filters.as_ptr().wrapping_add(id as usize));
         }
     }

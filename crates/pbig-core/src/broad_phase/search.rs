@@ -32,7 +32,7 @@ impl Search {
             self.listed.take(world);
             (boxes, filters) = (&self.listed.boxes, &self.listed.filters);
         }
-        let all = Boxes { boxes, filters: world.is_filtered.then_some(&filters[..]), keys: None };
+        let all = Boxes { boxes, filters: world.noted.is_filtered.then_some(&filters[..]), keys: None };
         let is_on_device = device.is_some();
         task.report.work += (boxes.len() - world.present.len()) as u64;
         let grouping = Some(Grouping::new(boxes.len()));
@@ -114,7 +114,7 @@ impl Listed {
         boxes.clear();
         boxes.extend(ids.iter().map(|id| world.boxes[*id as usize]));
         filters.clear();
-        if world.is_filtered {
+        if world.noted.is_filtered {
             filters.extend(ids.iter().map(|id| world.filters[*id as usize]));
         }
     }

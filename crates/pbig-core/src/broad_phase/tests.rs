@@ -146,7 +146,7 @@ fn many_boxes_set_on_threads_are_those_set_one_by_one() {
             let mut changes = [many.changes().to_vec(), single.changes().to_vec()];
             changes.iter_mut().for_each(|changes| changes.sort_unstable());
             assert_eq!(changes[0], changes[1], "round {round}");
-            assert_eq!(many.world.arrived, single.world.arrived, "round {round}");
+            assert_eq!(many.world.noted.arrived, single.world.noted.arrived, "round {round}");
             assert_eq!(many.update(), single.update(), "round {round}");
             assert_eq!(many.report().invalid, single.report().invalid, "round {round}");
         }

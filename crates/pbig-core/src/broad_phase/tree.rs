@@ -62,7 +62,7 @@ impl Tree {
     /// threads share the work, which a query does alone.
     pub(super) fn end_update(&mut self, world: &World) {
         let is_read = std::mem::take(self.is_read.get_mut());
-        if self.fresh.get_mut().is_some() || world.changed.is_empty() {
+        if self.fresh.get_mut().is_some() || world.noted.changed.is_empty() {
             return;
         }
         if is_read {
@@ -70,10 +70,10 @@ impl Tree {
             return;
         }
         let stale = self.stale_mut();
-        let changed = stale.changed.len() + world.changed.len();
+        let changed = stale.changed.len() + world.noted.changed.len();
         stale.knows_changes &= changed <= world.present.len() / KNOWN_CHANGES_IN;
         if stale.knows_changes {
-            stale.changed.extend_from_slice(&world.changed);
+            stale.changed.extend_from_slice(&world.noted.changed);
         } else {
             stale.changed.clear();
             stale.index.drop_peak(world.present.len());
@@ -102,7 +102,7 @@ impl Tree {
     /// arrive or a query asks. None do if there is no tree yet, so that there will be one.
     pub(super) fn arrivals(&mut self, world: &World) -> usize {
         let is_fresh = self.fresh.get_mut().is_some();
-        if is_fresh { 0 } else { self.stale_mut().index.arrivals(&world.boxes, &world.changed) }
+        if is_fresh { 0 } else { self.stale_mut().index.arrivals(&world.boxes, &world.noted.changed) }
     }
 
     /// Makes the tree fresh, for look-ups of the changed boxes. Returns it, and how many boxes were read.
@@ -138,7 +138,7 @@ impl Stale {
     /// Takes the tree, and brings it up to date. Returns how many boxes were read, too.
     fn refreshed(&mut self, world: &World, is_for_look_ups: bool) -> (Fresh, usize) {
         let mut changed = std::mem::take(&mut self.changed);
-        changed.extend_from_slice(&world.changed);
+        changed.extend_from_slice(&world.noted.changed);
         let known = self.knows_changes.then_some(&changed[..]);
         let (mut index, present) = (self.take(), world.present.iter());
         let read = index.refresh_present(&world.boxes, known, present, is_for_look_ups);

@@ -36,7 +36,7 @@ impl BroadPhase {
     /// Leaves the events, and forgets the changes.
     fn update_pairs(&mut self) -> Result<(), Error> {
         self.comparison.clear();
-        if self.world.changed.is_empty() {
+        if self.world.noted.changed.is_empty() {
             return Ok(());
         }
         self.kept.reserve_ids(self.world.ids());
@@ -55,7 +55,7 @@ impl BroadPhase {
         if self.device.is_wanted(self.config.backend, None, &mut self.report) && self.search(tree, true)? {
             return Ok(());
         }
-        let changed = self.world.changed.len();
+        let changed = self.world.noted.changed.len();
         if self.chooses_look_ups(tree, changed) {
             let is_done = self.look_up(tree);
             self.given_up.note(!is_done, changed);
@@ -92,7 +92,7 @@ impl BroadPhase {
         if !policy::may_look_up(boxes, changed) || self.given_up.forbids(changed) {
             return false;
         }
-        let arrived = (self.world.arrived as usize).min(changed);
+        let arrived = (self.world.noted.arrived as usize).min(changed);
         policy::may_place(boxes, arrived) || policy::may_place(boxes, tree.arrivals(&self.world))
     }
 
@@ -123,13 +123,13 @@ impl BroadPhase {
     }
 
     fn begin_report(&mut self) {
-        let (boxes, valid) = (self.world.present.len() as u64, self.world.valid);
+        let (boxes, valid) = (self.world.present.len() as u64, self.world.noted.valid);
         // A backend that was asked for stays unavailable until a call on it succeeds.
         let fallback = self.report.fallback.take().filter(|_| self.config.backend == Backend::Device);
         self.report = Report {
             boxes,
             invalid: boxes - u64::from(valid),
-            changed: self.world.changed.len() as u64,
+            changed: self.world.noted.changed.len() as u64,
             plan: Plan { boxes: valid, ..Plan::default() },
             fallback,
             ..Report::default()

@@ -30,19 +30,35 @@ pub(crate) struct World {
     pub(super) boxes: Vec<Aabb>,
     pub(super) filters: Vec<ProxyFilter>,
     states: Vec<u8>,
-    /// Ids that have changed since the last update, each once.
-    pub(super) changed: Vec<u32>,
+    pub(super) noted: Noted,
     /// Ids whose box of the last update was removed.
     pub(super) removed: Vec<u32>,
     /// Ids whose box was set and not removed, valid or not.
     pub(super) present: IdSet,
+    /// A clone makes its own when it needs one.
+    pub(super) tree: Scratch<Tree>,
+}
+
+/// Counts and lists that follow the boxes: of all, or what a thread adds to them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Noted {
+    /// Ids that have changed since the last update, each once.
+    pub(super) changed: Vec<u32>,
+    /// Valid boxes, modulo 2^32.
     pub(super) valid: u32,
     /// Boxes that came or jumped since the last update, or more: one that did so twice counts twice, and one that has left again counts, too.
     pub(super) arrived: u32,
-    /// Boxes that were ever given a filter other than [`ProxyFilter::ALL`].
+    /// Boxes were ever given a filter other than [`ProxyFilter::ALL`].
     pub(super) is_filtered: bool,
-    /// A clone makes its own when it needs one.
-    pub(super) tree: Scratch<Tree>,
+}
+
+impl Noted {
+    fn add(&mut self, more: Self) {
+        self.changed.extend(more.changed);
+        self.valid = self.valid.wrapping_add(more.valid);
+        self.arrived = self.arrived.saturating_add(more.arrived);
+        self.is_filtered |= more.is_filtered;
+    }
 }
 
 impl World {
@@ -79,16 +95,11 @@ impl World {
         self.present.reserve(ids);
     }
 
-    #[inline(always)]
-    fn all(&mut self) -> Part<'_> {
-        let Self { boxes, filters, states, changed, valid, arrived, is_filtered, .. } = self;
-        Part { first: 0, boxes, filters, states, changed, valid, arrived, is_filtered, is_noted: false }
-    }
-
     /// Runs a change on all boxes. The tree expires if one has changed.
     #[inline(always)]
     fn change<R>(&mut self, change: impl FnOnce(&mut Part<'_>) -> R) -> R {
-        let mut all = self.all();
+        let Self { boxes, filters, states, noted, .. } = self;
+        let mut all = Part { first: 0, boxes, filters, states, noted, is_noted: false };
         let result = change(&mut all);
         if all.is_noted {
             self.tree.expire();
@@ -120,8 +131,9 @@ impl World {
         if !are_known || !ids.is_sorted_by(|one, next| one < next) {
             return None;
         }
-        let (is_filtered, pieces) = (self.is_filtered, ids.len().div_ceil(PIECE));
-        let mut moved: Vec<Moved> = (0..pieces).map(|_| Moved { is_filtered, ..Moved::default() }).collect();
+        let pieces = ids.len().div_ceil(PIECE);
+        let noted = Noted { is_filtered: self.noted.is_filtered, ..Noted::default() };
+        let mut moved = vec![Moved { noted, ..Moved::default() }; pieces];
         // A part reaches from the first id of a piece to that of the next one.
         let end = ids.last().map_or(0, |last| *last as usize + 1);
         let start = |piece: usize| ids.get(piece * PIECE).map_or(end, |id| *id as usize);
@@ -134,19 +146,8 @@ impl World {
         let parts = ids.chunks(PIECE).zip(&mut moved).zip(boxes.zip(filters.zip(states)));
         let done = catch_unwind(AssertUnwindSafe(|| {
             run_parts(threads_for(pieces), parts, |_, ((ids, moved), (boxes, (filters, states)))| {
-                let Moved { changed, valid, arrived, is_filtered, is_noted, absent } = moved;
-                let first = ids[0];
-                let mut part = Part {
-                    first,
-                    boxes,
-                    filters,
-                    states,
-                    changed,
-                    valid,
-                    arrived,
-                    is_filtered,
-                    is_noted: false,
-                };
+                let Moved { noted, is_noted, absent } = moved;
+                let mut part = Part { first: ids[0], boxes, filters, states, noted, is_noted: false };
                 for &id in ids {
                     if let Some((aabb, filter)) = of(id)
                         && !part.set(id, aabb, filter, margin)
@@ -157,25 +158,17 @@ impl World {
                 }
             });
         }));
-        let absent = self.take_moved(moved);
-        done.unwrap_or_else(|panic| resume_unwind(panic));
-        Some(absent)
-    }
-
-    fn take_moved(&mut self, moved: Vec<Moved>) -> Vec<(u32, Aabb, ProxyFilter)> {
         let mut all_absent = Vec::new();
-        for Moved { changed, valid, arrived, is_filtered, is_noted, absent } in moved {
+        for Moved { noted, is_noted, absent } in moved {
             // A box that has changed before is not listed again.
             if is_noted {
                 self.tree.expire();
             }
-            self.changed.extend(changed);
-            self.valid = self.valid.wrapping_add(valid);
-            self.arrived = self.arrived.saturating_add(arrived);
-            self.is_filtered |= is_filtered;
+            self.noted.add(noted);
             all_absent.extend(absent);
         }
-        all_absent
+        done.unwrap_or_else(|panic| resume_unwind(panic));
+        Some(all_absent)
     }
 
     #[cfg(feature = "serde")]
@@ -215,41 +208,36 @@ impl World {
 
     /// Forgets all changes, after an update. The tree has noted them.
     pub(super) fn forget_changes(&mut self) {
-        if self.changed.len() * FORGET_ONE_BY_ONE_IN > self.ids() {
+        if self.noted.changed.len() * FORGET_ONE_BY_ONE_IN > self.ids() {
             self.states.iter_mut().for_each(|state| *state &= state::PRESENT);
         } else {
-            self.changed.iter().for_each(|id| self.states[*id as usize] &= state::PRESENT);
+            self.noted.changed.iter().for_each(|id| self.states[*id as usize] &= state::PRESENT);
         }
-        self.changed.clear();
+        self.noted.changed.clear();
         self.removed.clear();
-        self.arrived = 0;
+        self.noted.arrived = 0;
     }
 
     /// Drops known ids behind the last one that is present, and spare memory.
     pub(super) fn shrink(&mut self) {
         let used = self.states.iter().rposition(|&state| state != 0).map_or(0, |last| last + 1);
-        if self.changed.is_empty() {
+        if self.noted.changed.is_empty() {
             self.reserve_ids(used);
         }
         self.boxes.shrink_to_fit();
         self.filters.shrink_to_fit();
         self.states.shrink_to_fit();
-        self.changed.shrink_to_fit();
+        self.noted.changed.shrink_to_fit();
         self.removed.shrink_to_fit();
         self.present.shrink();
         self.tree = Scratch::default();
     }
 }
 
-/// Boxes that a thread has moved, and those that it could not.
-#[derive(Debug, Default)]
+/// A thread's changes, and the boxes that it could not move.
+#[derive(Clone, Debug, Default)]
 struct Moved {
-    changed: Vec<u32>,
-    /// Valid boxes that there are more, modulo 2^32.
-    valid: u32,
-    /// Boxes that came or jumped.
-    arrived: u32,
-    is_filtered: bool,
+    noted: Noted,
     /// A box has changed.
     is_noted: bool,
     absent: Vec<(u32, Aabb, ProxyFilter)>,
@@ -261,10 +249,7 @@ struct Part<'a> {
     boxes: &'a mut [Aabb],
     filters: &'a mut [ProxyFilter],
     states: &'a mut [u8],
-    changed: &'a mut Vec<u32>,
-    valid: &'a mut u32,
-    arrived: &'a mut u32,
-    is_filtered: &'a mut bool,
+    noted: &'a mut Noted,
     /// A box has changed.
     is_noted: bool,
 }
@@ -279,7 +264,7 @@ impl Part<'_> {
         if !self.set_aabb(id, aabb, margin) {
             return false;
         }
-        let is_unfiltered = !*self.is_filtered && filter.is(&ProxyFilter::ALL);
+        let is_unfiltered = !self.noted.is_filtered && filter.is(&ProxyFilter::ALL);
         if !is_unfiltered && !self.filters[self.at(id)].is(&filter) {
             self.set_filter(id, filter);
         }
@@ -313,7 +298,7 @@ impl Part<'_> {
         self.note_change(id);
         let i = self.at(id);
         self.filters[i] = filter;
-        *self.is_filtered |= !filter.is(&ProxyFilter::ALL);
+        self.noted.is_filtered |= !filter.is(&ProxyFilter::ALL);
     }
 
     /// Stores a box fat; an invalid one as nowhere, so that nothing pairs it later.
@@ -322,9 +307,10 @@ impl Part<'_> {
         let is_valid = aabb.is_valid();
         let stored = &self.boxes[i];
         let was_valid = !stored.min[0].is_nan();
-        *self.arrived = self.arrived.saturating_add(u32::from(is_valid && has_arrived(stored, &aabb)));
+        let noted = &mut *self.noted;
+        noted.arrived = noted.arrived.saturating_add(u32::from(is_valid && has_arrived(stored, &aabb)));
+        noted.valid = noted.valid.wrapping_add(u32::from(is_valid)).wrapping_sub(u32::from(was_valid));
         self.boxes[i] = if is_valid { aabb.inflated(margin) } else { Aabb::NOWHERE };
-        *self.valid = self.valid.wrapping_add(u32::from(is_valid)).wrapping_sub(u32::from(was_valid));
     }
 
     #[inline(always)]
@@ -333,7 +319,7 @@ impl Part<'_> {
         let i = self.at(id);
         if self.states[i] & state::CHANGED == 0 {
             self.states[i] |= state::CHANGED;
-            self.changed.push(id);
+            self.noted.changed.push(id);
         }
     }
 }
