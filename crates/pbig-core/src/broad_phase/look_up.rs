@@ -3,8 +3,7 @@
 use super::Task;
 use super::world::World;
 use crate::bvh::BoxIndex;
-use crate::memory::ShrinkingVec;
-use crate::pairs::{Comparison, Kept, differences, equal, sort_few};
+use crate::pairs::{Differences, Kept, differences, equal, sort_few};
 use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy;
 use crate::report::{Clock, stage};
@@ -32,14 +31,18 @@ impl LookUp {
         };
         index.in_order(&world.noted.changed, &mut self.order);
         task.kept.make_backward();
-        drop_pairs_of_removed(&world.removed, task.kept, &mut task.events.removed);
+        drop_pairs_of_removed(&world.removed, task.kept, &mut task.comparison.events.removed);
         task.report.stages.map += clock.lap();
         stage!("check");
         let is_forced = task.config.engine == Some(Engine::LookUp);
         let most = if is_forced { u64::MAX } else { policy::look_up_to_nodes(world.present.len()) };
         let budget = Budget::new(most);
         self.look_up((world, task.kept, index), &budget);
-        self.gather(task.events);
+        let events = &mut task.comparison.events;
+        events.gather(self.threads.iter().map(|thread| &thread.found));
+        let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
+        events.added.sort_unstable_by_key(word);
+        events.removed.sort_unstable_by_key(word);
         let sum = |of: fn(&Thread) -> u64| self.threads.iter().map(of).sum::<u64>();
         let (mut nodes, mut met) = (sum(|thread| thread.nodes), sum(|thread| thread.met));
         if budget.is_over() {
@@ -71,19 +74,8 @@ impl LookUp {
         });
     }
 
-    fn gather(&self, events: &mut Comparison) {
-        events.clear();
-        for thread in &self.threads {
-            events.added.extend_from_slice(&thread.added);
-            events.removed.extend_from_slice(&thread.removed);
-        }
-        events.sort();
-    }
-
     pub(super) fn settle(&mut self) {
-        for Thread { added, removed, .. } in &mut self.threads {
-            [added, removed].into_iter().for_each(ShrinkingVec::settle_and_clear);
-        }
+        self.threads.iter_mut().for_each(|thread| thread.found.settle_and_clear());
     }
 }
 
@@ -106,16 +98,14 @@ struct Thread {
     /// Ids that the box at hand overlaps, and those that it had as partners.
     now: Vec<u32>,
     was: Vec<u32>,
-    added: ShrinkingVec<Pair>,
-    removed: ShrinkingVec<Pair>,
+    found: Differences,
     nodes: u64,
     met: u64,
 }
 
 impl Thread {
     fn clear(&mut self) {
-        self.added.clear();
-        self.removed.clear();
+        self.found.clear();
         (self.nodes, self.met) = (0, 0);
     }
 
@@ -167,11 +157,11 @@ impl Thread {
     /// Notes the differences. The changed box with the lower id reports a pair of two changed boxes.
     #[inline(never)]
     fn compare_all(&mut self, world: &World, (lower, later): (&[u32], &[u32]), id: u32) {
-        let Self { now, was, added, removed, .. } = self;
+        let Self { now, was, found, .. } = self;
         let is_own = |other: u32| other > id || other < id && !world.has_changed(other);
         now.retain(|other| is_own(*other));
         was.clear();
         was.extend(lower.iter().chain(later).copied().filter(|other| is_own(*other)));
-        differences(id, was, now, added, removed);
+        differences(id, was, now, found);
     }
 }

@@ -89,7 +89,7 @@ struct Task<'a> {
     config: &'a Config,
     kept: &'a mut Kept,
     /// The events. Cleared first, and left sorted.
-    events: &'a mut Comparison,
+    comparison: &'a mut Comparison,
     report: &'a mut Report,
 }
 

@@ -84,7 +84,7 @@ impl Search {
                 .pairs
                 .iter()
                 .map(|pair| Pair { a: name(pair.a), b: name(pair.b) });
-            return task.events.compare_sorted(world.present.iter(), found, task.kept);
+            return task.comparison.compare_sorted(world.present.iter(), found, task.kept);
         }
         let boxes = names.map_or(world.ids(), <[u32]>::len);
         self.all_pairs.gather(Grouping::new(boxes), &mut self.groups);
@@ -92,7 +92,7 @@ impl Search {
             self.groups.rename_partners(names);
         }
         let doubted = is_on_device.then_some(&world.present);
-        task.events.run((&mut self.groups, names), task.kept, AllPairs::workers(boxes), doubted);
+        task.comparison.run((&mut self.groups, names), task.kept, AllPairs::workers(boxes), doubted);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::tree::Tree;
 use super::{BroadPhase, Events, Task};
-use crate::pairs::Comparison;
+use crate::pairs::Differences;
 use crate::policy;
 use crate::report::{Clock, Report};
 use crate::{Backend, Engine, Error, Plan};
@@ -29,8 +29,8 @@ impl BroadPhase {
     }
 
     fn swap_events(&mut self) {
-        std::mem::swap(&mut *self.comparison.added, &mut self.events.added);
-        std::mem::swap(&mut *self.comparison.removed, &mut self.events.removed);
+        std::mem::swap(&mut *self.comparison.events.added, &mut self.events.added);
+        std::mem::swap(&mut *self.comparison.events.removed, &mut self.events.removed);
     }
 
     /// Leaves the events, and forgets the changes.
@@ -70,14 +70,14 @@ impl BroadPhase {
 
     /// Looks the changed boxes up. Returns false if that takes too much work.
     fn look_up(&mut self, tree: &mut Tree) -> bool {
-        let Self { look_up, world, config, kept, comparison: events, report, .. } = self;
-        look_up.run(&mut Task { world, tree, config, kept, events, report })
+        let Self { look_up, world, config, kept, comparison, report, .. } = self;
+        look_up.run(&mut Task { world, tree, config, kept, comparison, report })
     }
 
     /// Searches all boxes, on the device or the CPU. Returns false if the device could not do it.
     fn search(&mut self, tree: &mut Tree, is_on_device: bool) -> Result<bool, Error> {
-        let Self { device, search, world, config, kept, comparison: events, report, .. } = self;
-        let mut task = Task { world, tree, config, kept, events, report };
+        let Self { device, search, world, config, kept, comparison, report, .. } = self;
+        let mut task = Task { world, tree, config, kept, comparison, report };
         search.run(&mut task, is_on_device.then_some(device))
     }
 
@@ -102,7 +102,7 @@ impl BroadPhase {
             return Ok(());
         }
         let mut clock = Clock::start();
-        let Comparison { added, removed, .. } = &*self.comparison;
+        let Differences { added, removed } = &self.comparison.events;
         let limit = self.config.limits.pairs();
         if (self.kept.len() + added.len() - removed.len()) as u64 > limit {
             return Err(Error::TooManyPairs { limit });
@@ -114,7 +114,7 @@ impl BroadPhase {
 
     /// Gives back a piece of the memory that a peak has left.
     fn settle(&mut self) {
-        let Comparison { added, removed, .. } = &*self.comparison;
+        let Differences { added, removed } = &self.comparison.events;
         let (pairs, events) = (self.kept.len(), added.len() + removed.len());
         self.look_up.settle();
         self.search.settle(pairs);

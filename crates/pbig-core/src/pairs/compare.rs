@@ -9,21 +9,46 @@ use crate::memory::ShrinkingVec;
 use crate::parallel::{run_parts_with, split_into};
 use crate::simd::{Simd, dispatch};
 
-/// The result of a comparison. `added` and `removed` are sorted.
+/// Pairs that began, and pairs that ended.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Comparison {
+pub(crate) struct Differences {
     pub(crate) added: ShrinkingVec<Pair>,
     pub(crate) removed: ShrinkingVec<Pair>,
+}
+
+impl Differences {
+    pub(crate) fn clear(&mut self) {
+        self.added.clear();
+        self.removed.clear();
+    }
+
+    /// Forgets the pairs, and gives back a piece of the memory that fewer of them than before do not need.
+    pub(crate) fn settle_and_clear(&mut self) {
+        [&mut self.added, &mut self.removed].into_iter().for_each(ShrinkingVec::settle_and_clear);
+    }
+
+    /// Takes the pairs of several threads, one behind the other.
+    pub(crate) fn gather<'a>(&mut self, parts: impl Iterator<Item = &'a Self> + Clone) {
+        self.clear();
+        // Not twice as much: after a peak these lists are the largest.
+        self.added.reserve_exact(parts.clone().map(|part| part.added.len()).sum());
+        self.removed.reserve_exact(parts.clone().map(|part| part.removed.len()).sum());
+        for part in parts {
+            self.added.extend_from_slice(&part.added);
+            self.removed.extend_from_slice(&part.removed);
+        }
+    }
+}
+
+/// The result of a comparison.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Comparison {
+    /// Sorted.
+    pub(crate) events: Differences,
     /// True if the found pairs have replaced the kept ones. Otherwise the events have to be applied to these.
     pub(crate) is_kept: bool,
     /// By group.
-    parts: Vec<Part>,
-}
-
-#[derive(Clone, Debug, Default)]
-struct Part {
-    added: ShrinkingVec<Pair>,
-    removed: ShrinkingVec<Pair>,
+    parts: Vec<Differences>,
 }
 
 impl Comparison {
@@ -40,7 +65,7 @@ impl Comparison {
         let mut next = std::mem::take(&mut kept.next);
         next.spans.resize(grouping.ids, Span::default());
         next.pool.resize(count, 0);
-        self.parts.resize_with(grouping.count, Part::default);
+        self.parts.resize_with(grouping.count, Differences::default);
         let old = &kept.forward;
         let ids = (0..grouping.count).map(|group| grouping.ids_of(group).len());
         let mut sorters = found.take_sorters(workers);
@@ -51,8 +76,7 @@ impl Comparison {
         run_parts_with(&mut sorters[..workers], parts, |sorter, group, (part, (spans, pool))| {
             let (first_id, first_place) =
                 (grouping.ids_of(group).start as u32, pairs.range(group).start as u32);
-            part.added.clear();
-            part.removed.clear();
+            part.clear();
             pairs.sort(group, sorter, spans, pool, first_place);
             if let Some(known) = doubted {
                 let name = |place: u32| names.map_or(place, |names| names[place as usize]);
@@ -60,12 +84,12 @@ impl Comparison {
                 groups::drop_false(rows, pool, first_place, known);
             }
             let new = NewRows { names, first_id, first_place, spans, pool };
-            dispatch!(Part::compare, part, old, &new);
+            dispatch!(compare, part, old, &new);
         });
         found.sorters = sorters;
         kept.next = next;
-        self.gather();
-        kept.adopt_next(names, &self.added, &self.removed);
+        self.events.gather(self.parts.iter());
+        kept.adopt_next(names, &self.events.added, &self.events.removed);
         self.is_kept = true;
     }
 
@@ -85,40 +109,21 @@ impl Comparison {
             }
             let was = kept.rows_of(a).1;
             if !equal(was, &is) {
-                row::differences(a, was, &is, &mut self.added, &mut self.removed);
+                row::differences(a, was, &is, &mut self.events);
             }
         }
     }
 
     /// Gives back a piece of the memory that fewer events than before do not need. The last update had `events`.
     pub(crate) fn settle(&mut self, events: usize) {
-        let parts = self.parts.iter_mut().flat_map(|part| [&mut part.added, &mut part.removed]);
-        parts.for_each(ShrinkingVec::settle_and_clear);
-        self.added.settle(events);
-        self.removed.settle(events);
+        self.parts.iter_mut().for_each(Differences::settle_and_clear);
+        self.events.added.settle(events);
+        self.events.removed.settle(events);
     }
 
     pub(crate) fn clear(&mut self) {
-        self.added.clear();
-        self.removed.clear();
+        self.events.clear();
         self.is_kept = false;
-    }
-
-    pub(crate) fn sort(&mut self) {
-        let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
-        self.added.sort_unstable_by_key(word);
-        self.removed.sort_unstable_by_key(word);
-    }
-
-    fn gather(&mut self) {
-        self.clear();
-        // Not twice as much: after a peak these lists are the largest.
-        self.added.reserve_exact(self.parts.iter().map(|part| part.added.len()).sum());
-        self.removed.reserve_exact(self.parts.iter().map(|part| part.removed.len()).sum());
-        for part in &self.parts {
-            self.added.extend_from_slice(&part.added);
-            self.removed.extend_from_slice(&part.removed);
-        }
     }
 }
 
@@ -134,15 +139,13 @@ struct NewRows<'a> {
     pool: &'a [u32],
 }
 
-impl Part {
-    /// Compares rows, most of which are short and have not changed.
-    #[inline(always)]
-    fn compare(simd: impl Simd, part: &mut Self, old: &Rows, new: &NewRows<'_>) {
-        for (place, span) in (new.first_id..).zip(new.spans) {
-            let a = new.names.map_or(place, |names| names[place as usize]);
-            let start = (span.start - new.first_place) as usize;
-            let (was, is) = (old.spans[a as usize].range(), start..start + span.len as usize);
-            row::compare(simd, a, (&old.pool, was), (new.pool, is), (&mut part.added, &mut part.removed));
-        }
+/// Compares rows, most of which are short and have not changed.
+#[inline(always)]
+fn compare(simd: impl Simd, part: &mut Differences, old: &Rows, new: &NewRows<'_>) {
+    for (place, span) in (new.first_id..).zip(new.spans) {
+        let a = new.names.map_or(place, |names| names[place as usize]);
+        let start = (span.start - new.first_place) as usize;
+        let (was, is) = (old.spans[a as usize].range(), start..start + span.len as usize);
+        row::compare(simd, a, (&old.pool, was), (new.pool, is), part);
     }
 }

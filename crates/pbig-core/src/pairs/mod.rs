@@ -9,7 +9,7 @@ mod groups;
 mod kept;
 mod row;
 
-pub(crate) use compare::Comparison;
+pub(crate) use compare::{Comparison, Differences};
 pub(crate) use groups::{Found, Grouping, Groups};
 pub(crate) use kept::Kept;
 pub(crate) use row::{differences, equal, sort_few};

@@ -1,5 +1,6 @@
 //! Sorts short rows of ids, and compares two rows.
 
+use super::compare::Differences;
 use crate::Pair;
 use crate::id_set::IdSet;
 use crate::simd::Simd;
@@ -81,14 +82,14 @@ fn sort_by_counting(from: &[u32], len: usize, to: &mut [u32]) {
 
 type RowAt<'a> = (&'a [u32], Range<usize>);
 
-/// Appends the pairs of `a` that are in one of two sorted rows only: to `removed` if in the old one.
+/// Appends the pairs of `a` that are in one of two sorted rows only.
 #[inline(always)]
 pub(super) fn compare(
     simd: impl Simd,
     a: u32,
     (old, was): RowAt<'_>,
     (new, is): RowAt<'_>,
-    (added, removed): (&mut Vec<Pair>, &mut Vec<Pair>),
+    to: &mut Differences,
 ) {
     let eight =
         |pool: &[u32], row: &Range<usize>| pool.get(row.start..).and_then(|rest| rest.first_chunk().copied());
@@ -97,14 +98,14 @@ pub(super) fn compare(
         // An old row that is empty may lie beyond the pool.
         let (was, is) = (old.get(was).unwrap_or(&[]), &new[is]);
         return if !equal(was, is) {
-            differences(a, was, is, added, removed)
+            differences(a, was, is, to)
         };
     };
     if was.len() == is.len() && simd.same_short(&was8, &is8, is.len()) {
         return;
     }
-    push(a, &was8, simd.absent(&was8, &is8, is.len()) & ((1 << was.len()) - 1), removed);
-    push(a, &is8, simd.absent(&is8, &was8, was.len()) & ((1 << is.len()) - 1), added);
+    push(a, &was8, simd.absent(&was8, &is8, is.len()) & ((1 << was.len()) - 1), &mut to.removed);
+    push(a, &is8, simd.absent(&is8, &was8, was.len()) & ((1 << is.len()) - 1), &mut to.added);
 }
 
 /// Appends the pairs of `a` with the elements of a mask.
@@ -125,7 +126,8 @@ pub(crate) fn equal(old: &[u32], new: &[u32]) -> bool {
 
 /// Appends the pairs of an id that are in one of two sorted rows only.
 #[inline(always)]
-pub(crate) fn differences(id: u32, old: &[u32], new: &[u32], added: &mut Vec<Pair>, removed: &mut Vec<Pair>) {
+pub(crate) fn differences(id: u32, old: &[u32], new: &[u32], to: &mut Differences) {
+    let Differences { added, removed } = to;
     let (mut i, mut j) = (0, 0);
     while i < old.len() && j < new.len() {
         let (was, is) = (old[i], new[j]);
@@ -145,10 +147,10 @@ pub(crate) fn differences(id: u32, old: &[u32], new: &[u32], added: &mut Vec<Pai
 mod tests {
     use super::*;
 
-    fn compared(simd: impl Simd, old: &[u32], new: &[u32]) -> [Vec<Pair>; 2] {
-        let [mut added, mut removed] = [vec![], vec![]];
-        compare(simd, 1, (old, 0..3), (new, 0..4), (&mut added, &mut removed));
-        [added, removed]
+    fn compared(simd: impl Simd, old: &[u32], new: &[u32]) -> Differences {
+        let mut differences = Differences::default();
+        compare(simd, 1, (old, 0..3), (new, 0..4), &mut differences);
+        differences
     }
 
     #[test]
@@ -157,9 +159,9 @@ mod tests {
         let old = [2, 4, 6, 5, 7, 5, 7, 5, 7];
         let new = [4, 5, 6, 7, 2, 2, 2, 2, 2];
         for (old, new) in [(&old[..], &new[..]), (&old[..3], &new[..4]), (&old[..], &new[..4])] {
-            let [added, removed] = crate::simd::dispatch!(compared, old, new);
-            assert_eq!(added, [5, 7].map(|b| Pair { a: 1, b }));
-            assert_eq!(removed, [Pair { a: 1, b: 2 }]);
+            let Differences { added, removed } = crate::simd::dispatch!(compared, old, new);
+            assert_eq!(*added, [5, 7].map(|b| Pair { a: 1, b }));
+            assert_eq!(*removed, [Pair { a: 1, b: 2 }]);
         }
     }
 
