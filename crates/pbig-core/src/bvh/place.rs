@@ -55,25 +55,16 @@ impl BoxIndex {
         let leaf = place as usize / LANES;
         self.nodes[leaf].children[place as usize % LANES] = NONE;
         self.left = leaf;
-        self.gain_room(leaf);
+        self.change_room(leaf, true);
     }
 
-    /// Adds a free lane to a leaf, or a child with room to a node, and so on above if it had none.
-    fn gain_room(&mut self, mut node: usize) {
+    /// Counts one free lane more in a leaf, or one less. A node above counts the children that have room.
+    fn change_room(&mut self, mut node: usize, is_more: bool) {
         loop {
-            self.room[node] += 1;
-            if self.room[node] > 1 || self.parents[node] == NONE {
-                return;
-            }
-            node = self.parents[node] as usize / LANES;
-        }
-    }
-
-    /// Takes a free lane from a leaf, or a child with room from a node, and so on above if it has none left.
-    fn lose_room(&mut self, mut node: usize) {
-        loop {
-            self.room[node] -= 1;
-            if self.room[node] > 0 || self.parents[node] == NONE {
+            let room = &mut self.room[node];
+            let had_room = *room > 0;
+            *room = if is_more { *room + 1 } else { *room - 1 };
+            if had_room == (*room > 0) || self.parents[node] == NONE {
                 return;
             }
             node = self.parents[node] as usize / LANES;
@@ -116,7 +107,7 @@ impl BoxIndex {
         node.children[lane] = id;
         node.set(lane, aabb);
         self.places[id as usize] = (leaf * LANES + lane) as u32;
-        self.lose_room(leaf);
+        self.change_room(leaf, false);
     }
 
     /// Returns a leaf with a free lane that grows little with a box: below some children of the root that grow least.
