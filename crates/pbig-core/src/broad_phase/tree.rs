@@ -154,7 +154,7 @@ impl Fresh {
     fn sort(&self, world: &World) -> &BoxIndex {
         let sort = || {
             let mut index = BoxIndex::default();
-            index.sort_present(&world.boxes, world.present.iter());
+            index.refresh_present(&world.boxes, None, world.present.iter(), false);
             index
         };
         match self.sorting.try_lock() {

@@ -167,12 +167,7 @@ impl BoxIndex {
 
     /// Sorts the boxes as they are now.
     pub fn sort(&mut self, boxes: &[Aabb]) {
-        self.sort_present(boxes, 0..boxes.len() as u32);
-    }
-
-    /// As [`BoxIndex::sort`]; no id but the `present` ones has a box.
-    pub(crate) fn sort_present(&mut self, boxes: &[Aabb], present: impl Iterator<Item = u32>) {
-        self.lay_out(boxes, present, Order::SORTED);
+        self.sort_sets(boxes, None);
     }
 
     /// Sorts the boxes; of two sets, ids from `split` on are the second, and no leaf has boxes of both.
