@@ -20,18 +20,19 @@ pub(super) struct Tree {
 }
 
 /// A tree of the boxes as they are, which queries read at once.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Fresh {
-    index: BoxIndex,
+    // An update moves it a few times; without a box that takes longer than a look-up.
+    index: Box<BoxIndex>,
     /// A tree of these boxes in a better order, made once queries have looked at as many nodes as a sort costs.
-    sorted: OnceLock<BoxIndex>,
+    sorted: OnceLock<Box<BoxIndex>>,
     /// Held by the query that sorts. The others go on with the tree as it is.
     sorting: Mutex<()>,
 }
 
 #[derive(Debug, Default)]
 struct Stale {
-    index: BoxIndex,
+    index: Option<Box<BoxIndex>>,
     /// Ids of boxes that may have changed since, repeated or not, beside those that have changed since the last update.
     changed: Vec<u32>,
     /// False if `changed` was given up because it grew too long.
@@ -50,7 +51,7 @@ impl Tree {
     fn make_stale(&mut self) {
         if let Some(Fresh { index, sorted, .. }) = self.fresh.take() {
             let stale = self.stale_mut();
-            (stale.index, stale.knows_changes) = (sorted.into_inner().unwrap_or(index), true);
+            (stale.index, stale.knows_changes) = (Some(sorted.into_inner().unwrap_or(index)), true);
         }
     }
 
@@ -76,7 +77,7 @@ impl Tree {
             stale.changed.extend_from_slice(&world.noted.changed);
         } else {
             stale.changed.clear();
-            stale.index.drop_peak(world.present.len());
+            stale.index.iter_mut().for_each(|index| index.drop_peak(world.present.len()));
         }
     }
 
@@ -102,7 +103,8 @@ impl Tree {
     /// arrive or a query asks. None do if there is no tree yet, so that there will be one.
     pub(super) fn arrivals(&mut self, world: &World) -> usize {
         let is_fresh = self.fresh.get_mut().is_some();
-        if is_fresh { 0 } else { self.stale_mut().index.arrivals(&world.boxes, &world.noted.changed) }
+        let index = self.stale_mut().index.as_ref().filter(|_| !is_fresh);
+        index.map_or(0, |index| index.arrivals(&world.boxes, &world.noted.changed))
     }
 
     /// Makes the tree fresh, for look-ups of the changed boxes. Returns it, and how many boxes were read.
@@ -122,17 +124,18 @@ impl Tree {
     /// Takes over a tree that was sorted just now from all boxes. The one so far is left in its place, for its memory.
     pub(super) fn adopt(&mut self, sorted: &mut BoxIndex) {
         self.make_stale();
-        let index = std::mem::replace(sorted, self.stale_mut().take());
-        self.fresh = Fresh { index, ..Fresh::default() }.into();
+        let mut index = self.stale_mut().take();
+        std::mem::swap(&mut *index, sorted);
+        self.fresh = Fresh::from(index).into();
     }
 }
 
 impl Stale {
     /// Takes the tree, and forgets what has changed since.
-    fn take(&mut self) -> BoxIndex {
+    fn take(&mut self) -> Box<BoxIndex> {
         self.changed.clear();
         self.knows_changes = false;
-        std::mem::take(&mut self.index)
+        self.index.take().unwrap_or_default()
     }
 
     /// Takes the tree, and brings it up to date. Returns how many boxes were read, too.
@@ -144,7 +147,13 @@ impl Stale {
         let read = index.refresh_present(&world.boxes, known, present, is_for_look_ups);
         changed.clear();
         self.changed = changed;
-        (Fresh { index, ..Fresh::default() }, read)
+        (Fresh::from(index), read)
+    }
+}
+
+impl From<Box<BoxIndex>> for Fresh {
+    fn from(index: Box<BoxIndex>) -> Self {
+        Self { index, sorted: OnceLock::new(), sorting: Mutex::new(()) }
     }
 }
 
@@ -153,7 +162,7 @@ impl Fresh {
     #[cold]
     fn sort(&self, world: &World) -> &BoxIndex {
         let sort = || {
-            let mut index = BoxIndex::default();
+            let mut index = Box::<BoxIndex>::default();
             index.refresh_present(&world.boxes, None, world.present.iter(), false);
             index
         };

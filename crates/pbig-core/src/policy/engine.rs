@@ -30,7 +30,7 @@ const FEW_ARRIVALS: usize = 8;
 const SMALL_WORLD: usize = 4096;
 
 /// Minimum number of changed boxes for look-ups on several threads.
-pub(crate) const PARALLEL_FROM_CHANGES: usize = 1024;
+pub(crate) const PARALLEL_FROM_CHANGES: usize = 256;
 
 /// Returns true if so many changed boxes may be looked up.
 pub(crate) fn may_look_up(boxes: usize, changed: usize) -> bool {
