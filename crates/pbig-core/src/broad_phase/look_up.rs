@@ -29,7 +29,7 @@ impl LookUp {
             stage!("map");
             task.tree.refresh_for_look_ups(world)
         };
-        index.in_order(&world.noted.changed, &mut self.order);
+        index.in_order(&world.changed, &mut self.order);
         task.kept.make_backward();
         drop_pairs_of_removed(&world.removed, task.kept, &mut task.comparison.events.removed);
         task.report.stages.map += clock.lap();

@@ -64,7 +64,7 @@ impl BroadPhase {
     /// Returns the ids of changed boxes: stored anew, given another filter, inserted or removed since the last update. In the
     /// order of their first change.
     pub fn changes(&self) -> &[u32] {
-        &self.world.noted.changed
+        &self.world.changed
     }
 
     /// Returns the number of pairs: those of the last update, less those of boxes removed since. After a removal, and until

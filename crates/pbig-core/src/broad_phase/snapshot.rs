@@ -41,7 +41,7 @@ struct Snapshot {
 impl Serialize for BroadPhase {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let world = &self.world;
-        let mut changed: Vec<u32> = world.noted.changed.clone();
+        let mut changed: Vec<u32> = world.changed.clone();
         changed.sort_unstable();
         let filter = |id: u32| self.filter(id).copied().unwrap_or_default();
         let ids = world.ids() as u32;

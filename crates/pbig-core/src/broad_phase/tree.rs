@@ -63,7 +63,7 @@ impl Tree {
     /// threads share the work, which a query does alone.
     pub(super) fn end_update(&mut self, world: &World) {
         let is_read = std::mem::take(self.is_read.get_mut());
-        if self.fresh.get_mut().is_some() || world.noted.changed.is_empty() {
+        if self.fresh.get_mut().is_some() || world.changed.is_empty() {
             return;
         }
         if is_read {
@@ -71,10 +71,10 @@ impl Tree {
             return;
         }
         let stale = self.stale_mut();
-        let changed = stale.changed.len() + world.noted.changed.len();
+        let changed = stale.changed.len() + world.changed.len();
         stale.knows_changes &= changed <= world.present.len() / KNOWN_CHANGES_IN;
         if stale.knows_changes {
-            stale.changed.extend_from_slice(&world.noted.changed);
+            stale.changed.extend_from_slice(&world.changed);
         } else {
             stale.changed.clear();
             stale.index.iter_mut().for_each(|index| index.drop_peak(world.present.len()));
@@ -104,7 +104,7 @@ impl Tree {
     pub(super) fn arrivals(&mut self, world: &World) -> usize {
         let is_fresh = self.fresh.get_mut().is_some();
         let index = self.stale_mut().index.as_ref().filter(|_| !is_fresh);
-        index.map_or(0, |index| index.arrivals(&world.boxes, &world.noted.changed))
+        index.map_or(0, |index| index.arrivals(&world.boxes, &world.changed))
     }
 
     /// Makes the tree fresh, for look-ups of the changed boxes. Returns it, and how many boxes were read.
@@ -141,7 +141,7 @@ impl Stale {
     /// Takes the tree, and brings it up to date. Returns how many boxes were read, too.
     fn refreshed(&mut self, world: &World, is_for_look_ups: bool) -> (Fresh, usize) {
         let mut changed = std::mem::take(&mut self.changed);
-        changed.extend_from_slice(&world.noted.changed);
+        changed.extend_from_slice(&world.changed);
         let known = self.knows_changes.then_some(&changed[..]);
         let (mut index, present) = (self.take(), world.present.iter());
         let read = index.refresh_present(&world.boxes, known, present, is_for_look_ups);

@@ -36,7 +36,7 @@ impl BroadPhase {
     /// Leaves the events, and forgets the changes.
     fn update_pairs(&mut self) -> Result<(), Error> {
         self.comparison.clear();
-        if self.world.noted.changed.is_empty() {
+        if self.world.changed.is_empty() {
             return Ok(());
         }
         self.kept.reserve_ids(self.world.ids());
@@ -55,7 +55,7 @@ impl BroadPhase {
         if self.device.is_wanted(self.config.backend, None, &mut self.report) && self.search(tree, true)? {
             return Ok(());
         }
-        let changed = self.world.noted.changed.len();
+        let changed = self.world.changed.len();
         if self.chooses_look_ups(tree, changed) {
             let is_done = self.look_up(tree);
             self.given_up.note(!is_done, changed);
@@ -129,7 +129,7 @@ impl BroadPhase {
         self.report = Report {
             boxes,
             invalid: boxes - u64::from(valid),
-            changed: self.world.noted.changed.len() as u64,
+            changed: self.world.changed.len() as u64,
             plan: Plan { boxes: valid, ..Plan::default() },
             fallback,
             ..Report::default()

@@ -30,6 +30,8 @@ pub(crate) struct World {
     pub(super) boxes: Vec<Aabb>,
     pub(super) filters: Vec<ProxyFilter>,
     states: Vec<u8>,
+    /// Ids that have changed since the last update, each once.
+    pub(super) changed: Vec<u32>,
     pub(super) noted: Noted,
     /// Ids whose box of the last update was removed.
     pub(super) removed: Vec<u32>,
@@ -39,11 +41,9 @@ pub(crate) struct World {
     pub(super) tree: Scratch<Tree>,
 }
 
-/// Counts and lists that follow the boxes: of all, or what a thread adds to them.
-#[derive(Clone, Debug, Default)]
+/// Counts that follow the boxes: of all, or what a thread adds to them.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Noted {
-    /// Ids that have changed since the last update, each once.
-    pub(super) changed: Vec<u32>,
     /// Valid boxes, modulo 2^32.
     pub(super) valid: u32,
     /// Boxes that came or jumped since the last update, or more: one that did so twice counts twice, and one that has left again counts, too.
@@ -54,7 +54,6 @@ pub(super) struct Noted {
 
 impl Noted {
     fn add(&mut self, more: Self) {
-        self.changed.extend(more.changed);
         self.valid = self.valid.wrapping_add(more.valid);
         self.arrived = self.arrived.saturating_add(more.arrived);
         self.is_filtered |= more.is_filtered;
@@ -97,9 +96,9 @@ impl World {
 
     /// Runs a change on all boxes. The tree expires if one has changed.
     #[inline(always)]
-    fn change<R>(&mut self, change: impl FnOnce(&mut Part<'_>) -> R) -> R {
-        let Self { boxes, filters, states, noted, .. } = self;
-        let mut all = Part { first: 0, boxes, filters, states, noted, is_noted: false };
+    fn change<R>(&mut self, change: impl FnOnce(&mut Part<'_, &mut Vec<u32>>) -> R) -> R {
+        let Self { boxes, filters, states, changed, noted, .. } = self;
+        let mut all = Part { first: 0, boxes, filters, states, changed, noted, is_noted: false };
         let result = change(&mut all);
         if all.is_noted {
             self.tree.expire();
@@ -143,11 +142,16 @@ impl World {
             split_into(&mut self.filters[start(0)..], lens()),
             split_into(&mut self.states[start(0)..], lens()),
         );
-        let parts = ids.chunks(PIECE).zip(&mut moved).zip(boxes.zip(filters.zip(states)));
+        // Each piece has room for its ids, so that no thread asks for memory.
+        let listed = self.changed.len();
+        self.changed.resize(listed + ids.len(), 0);
+        let room = self.changed[listed..].chunks_mut(PIECE);
+        let parts = ids.chunks(PIECE).zip(room).zip(&mut moved).zip(boxes.zip(filters.zip(states)));
         let done = catch_unwind(AssertUnwindSafe(|| {
-            run_parts(threads_for(pieces), parts, |_, ((ids, moved), (boxes, (filters, states)))| {
-                let Moved { noted, is_noted, absent } = moved;
-                let mut part = Part { first: ids[0], boxes, filters, states, noted, is_noted: false };
+            run_parts(threads_for(pieces), parts, |_, (((ids, room), moved), (boxes, (filters, states)))| {
+                let Moved { listed, noted, is_noted, absent } = moved;
+                let (first, changed) = (ids[0], Room { room, listed });
+                let mut part = Part { first, boxes, filters, states, changed, noted, is_noted: false };
                 for &id in ids {
                     if let Some((aabb, filter)) = of(id)
                         && !part.set(id, aabb, filter, margin)
@@ -158,8 +162,18 @@ impl World {
                 }
             });
         }));
+        let absent = self.take_moved(moved, listed);
+        done.unwrap_or_else(|panic| resume_unwind(panic));
+        Some(absent)
+    }
+
+    /// Notes what threads have moved. The ids that each has listed lie at the beginning of its room, from `end` on.
+    fn take_moved(&mut self, moved: Vec<Moved>, mut end: usize) -> Vec<(u32, Aabb, ProxyFilter)> {
         let mut all_absent = Vec::new();
-        for Moved { noted, is_noted, absent } in moved {
+        let rooms = (end..).step_by(PIECE);
+        for (room, Moved { listed, noted, is_noted, absent }) in rooms.zip(moved) {
+            self.changed.copy_within(room..room + listed, end);
+            end += listed;
             // A box that has changed before is not listed again.
             if is_noted {
                 self.tree.expire();
@@ -167,8 +181,8 @@ impl World {
             self.noted.add(noted);
             all_absent.extend(absent);
         }
-        done.unwrap_or_else(|panic| resume_unwind(panic));
-        Some(all_absent)
+        self.changed.truncate(end);
+        all_absent
     }
 
     #[cfg(feature = "serde")]
@@ -208,12 +222,12 @@ impl World {
 
     /// Forgets all changes, after an update. The tree has noted them.
     pub(super) fn forget_changes(&mut self) {
-        if self.noted.changed.len() * FORGET_ONE_BY_ONE_IN > self.ids() {
+        if self.changed.len() * FORGET_ONE_BY_ONE_IN > self.ids() {
             self.states.iter_mut().for_each(|state| *state &= state::PRESENT);
         } else {
-            self.noted.changed.iter().for_each(|id| self.states[*id as usize] &= state::PRESENT);
+            self.changed.iter().for_each(|id| self.states[*id as usize] &= state::PRESENT);
         }
-        self.noted.changed.clear();
+        self.changed.clear();
         self.removed.clear();
         self.noted.arrived = 0;
     }
@@ -221,40 +235,70 @@ impl World {
     /// Drops known ids behind the last one that is present, and spare memory.
     pub(super) fn shrink(&mut self) {
         let used = self.states.iter().rposition(|&state| state != 0).map_or(0, |last| last + 1);
-        if self.noted.changed.is_empty() {
+        if self.changed.is_empty() {
             self.reserve_ids(used);
         }
         self.boxes.shrink_to_fit();
         self.filters.shrink_to_fit();
         self.states.shrink_to_fit();
-        self.noted.changed.shrink_to_fit();
+        self.changed.shrink_to_fit();
         self.removed.shrink_to_fit();
         self.present.shrink();
         self.tree = Scratch::default();
     }
 }
 
-/// A thread's changes, and the boxes that it could not move.
+/// A thread's changes, and the boxes that it could not move. Other threads write what would lie beside it.
 #[derive(Clone, Debug, Default)]
+#[repr(align(128))]
 struct Moved {
+    /// Number of changed ids that it has listed.
+    listed: usize,
     noted: Noted,
     /// A box has changed.
     is_noted: bool,
     absent: Vec<(u32, Aabb, ProxyFilter)>,
 }
 
+/// A list of ids that have changed.
+trait List {
+    fn add(&mut self, id: u32);
+}
+
+impl List for &mut Vec<u32> {
+    #[inline(always)]
+    fn add(&mut self, id: u32) {
+        self.push(id);
+    }
+}
+
+/// Room for the ids of a piece.
+struct Room<'a> {
+    room: &'a mut [u32],
+    listed: &'a mut usize,
+}
+
+impl List for Room<'_> {
+    #[inline(always)]
+    fn add(&mut self, id: u32) {
+        self.room[*self.listed] = id;
+        *self.listed += 1;
+    }
+}
+
 /// The boxes of all ids, or those of some consecutive ones, and where their changes are noted.
-struct Part<'a> {
+struct Part<'a, L> {
     first: u32,
     boxes: &'a mut [Aabb],
     filters: &'a mut [ProxyFilter],
     states: &'a mut [u8],
+    changed: L,
     noted: &'a mut Noted,
     /// A box has changed.
     is_noted: bool,
 }
 
-impl Part<'_> {
+impl<L: List> Part<'_, L> {
     /// Moves a box that is present. Returns false, and does nothing, if it is not.
     ///
     /// A valid stored box is present, so its state is not read if it holds the new box. Its filter is read only if any box was
@@ -322,7 +366,7 @@ impl Part<'_> {
         let i = self.at(id);
         if self.states[i] & state::CHANGED == 0 {
             self.states[i] |= state::CHANGED;
-            self.noted.changed.push(id);
+            self.changed.add(id);
         }
     }
 }
