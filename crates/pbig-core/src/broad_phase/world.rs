@@ -94,28 +94,45 @@ impl World {
         self.present.reserve(ids);
     }
 
-    /// Runs a change on all boxes. The tree expires if one has changed.
     #[inline(always)]
-    fn change<R>(&mut self, change: impl FnOnce(&mut Part<'_, &mut Vec<u32>>) -> R) -> R {
+    fn all(&mut self) -> Part<'_, &mut Vec<u32>> {
         let Self { boxes, filters, states, changed, noted, .. } = self;
-        let mut all = Part { first: 0, boxes, filters, states, changed, noted, is_noted: false };
-        let result = change(&mut all);
-        if all.is_noted {
+        Part { first: 0, boxes, filters, states, changed, noted, is_noted: false }
+    }
+
+    /// The tree expires if a box has changed.
+    #[inline(always)]
+    fn expire_tree(&mut self, is_noted: bool) {
+        if is_noted {
             self.tree.expire();
         }
-        result
+    }
+
+    /// Runs a change on all boxes.
+    fn change(&mut self, change: impl FnOnce(&mut Part<'_, &mut Vec<u32>>)) {
+        let mut all = self.all();
+        change(&mut all);
+        let is_noted = all.is_noted;
+        self.expire_tree(is_noted);
     }
 
     /// Moves a box that is present. Returns false, and does nothing, if it is not.
+    // Without a closure, which may become a call.
     #[inline(always)]
     pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
-        self.change(|all| all.set(id, aabb, filter, margin))
+        let mut all = self.all();
+        let (is_present, is_noted) = (all.set(id, aabb, filter, margin), all.is_noted);
+        self.expire_tree(is_noted);
+        is_present
     }
 
     /// As [`World::set`], with the filter that the box has.
     #[inline(always)]
     pub(super) fn set_aabb(&mut self, id: u32, aabb: Aabb, margin: f32) -> bool {
-        self.change(|all| all.set_aabb(id, aabb, margin))
+        let mut all = self.all();
+        let (is_present, is_noted) = (all.set_aabb(id, aabb, margin), all.is_noted);
+        self.expire_tree(is_noted);
+        is_present
     }
 
     /// Moves many boxes on threads. `of` returns box and filter of an id, or none to leave its box alone. Returns those that are not
@@ -127,7 +144,9 @@ impl World {
         margin: f32,
     ) -> Option<Vec<(u32, Aabb, ProxyFilter)>> {
         let are_known = ids.last().is_none_or(|last| (*last as usize) < self.ids());
-        if !are_known || !ids.is_sorted_by(|one, next| one < next) {
+        // Without an end in between it is done by vectors, in a quarter of the time.
+        let ascend = ids.windows(2).fold(true, |ascend, pair| ascend & (pair[0] < pair[1]));
+        if !are_known || !ascend {
             return None;
         }
         let pieces = ids.len().div_ceil(PIECE);
@@ -175,9 +194,7 @@ impl World {
             self.changed.copy_within(room..room + listed, end);
             end += listed;
             // A box that has changed before is not listed again.
-            if is_noted {
-                self.tree.expire();
-            }
+            self.expire_tree(is_noted);
             self.noted.add(noted);
             all_absent.extend(absent);
         }
