@@ -194,14 +194,9 @@ impl Finder {
         let (Boxes { boxes, filters, .. }, Request { config, grouping, .. }) = (*all, *request);
         let (is_sorted, max_pairs) = (grouping.is_some(), config.limits.pairs());
         let request = SearchRequest { boxes, filters, is_sorted, max_pairs };
-        let pairs = std::mem::take(&mut self.pairs);
-        let (done, found) = self.device.find_all(&request, pairs, &mut self.report);
+        let is_in_order = self.device.find_all(&request, &mut self.pairs, &mut self.report);
         self.count_invalid();
-        if !done? {
-            return Ok(false);
-        }
-        let is_in_order = found.is_in_order();
-        self.pairs = found.into_vec();
+        let Some(is_in_order) = is_in_order? else { return Ok(false) };
         if grouping.is_some() && !is_in_order {
             self.all_pairs.take(&mut self.pairs, grouping);
             self.emit(grouping);

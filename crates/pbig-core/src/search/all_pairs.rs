@@ -315,13 +315,13 @@ impl AllPairs {
         let max_pairs = config.limits.pairs();
         // Rows are sorted later, by several threads.
         let request = SearchRequest { boxes, filters, is_sorted: false, max_pairs };
-        let (done, found) = device.find_all(&request, std::mem::take(&mut self.answer), report);
-        let mut found = found.into_vec();
-        if done == Ok(true) {
+        let mut found = std::mem::take(&mut *self.answer);
+        let is_found = device.find_all(&request, &mut found, report).map(|found| found.is_some());
+        if is_found == Ok(true) {
             self.take(&mut found, grouping);
         }
         *self.answer = found;
-        done
+        is_found
     }
 
     /// Takes pairs that a device has found. Several threads copy and count them.
