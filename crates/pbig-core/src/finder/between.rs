@@ -118,17 +118,16 @@ impl Finder {
     }
 
     fn name_ids(&mut self) {
-        stage!("emit");
-        let mut clock = Clock::start();
         let sets = &self.sets;
         let pieces = self.pairs_between.len().div_ceil(PIECE);
-        run_parts(threads_for(pieces), self.pairs_between.chunks_mut(PIECE), |_, pairs| {
+        let name = |_, pairs: &mut [Pair]| {
             for pair in pairs {
                 let CrossPair { a, b } = sets.named(pair);
                 *pair = Pair { a, b };
             }
-        });
-        self.report.stages.emit += clock.lap();
+        };
+        let parts = self.pairs_between.chunks_mut(PIECE);
+        stage!(self.report, emit, run_parts(threads_for(pieces), parts, name));
     }
 }
 
