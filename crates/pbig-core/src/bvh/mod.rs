@@ -22,7 +22,7 @@ use crate::policy;
 use crate::simd::{Simd, dispatch};
 use crate::{Aabb, OccupiedCell};
 use node::Node;
-pub(crate) use node::{LANES, NONE, next};
+pub(crate) use node::{LANES, NONE};
 use query::Cast;
 use std::sync::atomic::{AtomicU64, Ordering};
 

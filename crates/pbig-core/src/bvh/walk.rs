@@ -1,10 +1,10 @@
 //! Walking the nodes that a query meets, about the nearest first.
 
 use super::BoxIndex;
-use super::node::{LANES, Lanes, next};
+use super::node::{LANES, Lanes};
 use super::query::{Cast, Near, Query};
 use crate::Aabb;
-use crate::simd::{Eight, Simd};
+use crate::simd::{Eight, Simd, next};
 use arrayvec::ArrayVec;
 
 /// Maximum number of nodes that wait: seven for each level and one more, and 2^32 boxes of 448 classes make 14 levels.
