@@ -15,7 +15,7 @@ mod query;
 mod refit;
 mod sort;
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;
 mod walk;
 
 use crate::policy;
