@@ -97,7 +97,7 @@ impl World {
 
     /// Runs a change on all boxes. The tree expires if one has changed.
     #[inline(always)]
-    fn change<R>(&mut self, change: impl FnOnce(&mut Part<'_>) -> R) -> R {
+    pub(super) fn change<R>(&mut self, change: impl FnOnce(&mut Part<'_>) -> R) -> R {
         let Self { boxes, filters, states, noted, .. } = self;
         let mut all = Part { first: 0, boxes, filters, states, noted, is_noted: false };
         let result = change(&mut all);
@@ -105,18 +105,6 @@ impl World {
             self.tree.expire();
         }
         result
-    }
-
-    /// Moves a box that is present. Returns false, and does nothing, if it is not.
-    #[inline(always)]
-    pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
-        self.change(|all| all.set(id, aabb, filter, margin))
-    }
-
-    /// As [`World::set`], with the filter that the box has.
-    #[inline(always)]
-    pub(super) fn set_aabb(&mut self, id: u32, aabb: Aabb, margin: f32) -> bool {
-        self.change(|all| all.set_aabb(id, aabb, margin))
     }
 
     /// Moves many boxes on threads. `of` returns box and filter of an id, or none to leave its box alone. Returns those that are not
@@ -169,16 +157,6 @@ impl World {
         }
         done.unwrap_or_else(|panic| resume_unwind(panic));
         Some(all_absent)
-    }
-
-    #[cfg(feature = "serde")]
-    pub(super) fn note_change(&mut self, id: u32) {
-        self.change(|all| all.note_change(id));
-    }
-
-    #[cold]
-    pub(super) fn set_filter(&mut self, id: u32, filter: ProxyFilter) {
-        self.change(|all| all.set_filter(id, filter));
     }
 
     /// Inserts a box that is not present; its id is known.
@@ -244,7 +222,7 @@ struct Moved {
 }
 
 /// The boxes of all ids, or those of some consecutive ones, and where their changes are noted.
-struct Part<'a> {
+pub(super) struct Part<'a> {
     first: u32,
     boxes: &'a mut [Aabb],
     filters: &'a mut [ProxyFilter],
@@ -260,7 +238,7 @@ impl Part<'_> {
     /// A valid stored box is present, so its state is not read if it holds the new box. Its filter is read only if any box was
     /// ever filtered.
     #[inline(always)]
-    fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
+    pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
         if !self.set_aabb(id, aabb, margin) {
             return false;
         }
@@ -278,7 +256,7 @@ impl Part<'_> {
 
     /// As [`Part::set`], with the filter that the box has.
     #[inline(always)]
-    fn set_aabb(&mut self, id: u32, aabb: Aabb, margin: f32) -> bool {
+    pub(super) fn set_aabb(&mut self, id: u32, aabb: Aabb, margin: f32) -> bool {
         let i = self.at(id);
         let Some(fat) = self.boxes.get(i) else { return false };
         let gaps = one_box::gaps_are_within(&aabb, fat, slack(margin));
@@ -294,7 +272,7 @@ impl Part<'_> {
     }
 
     #[cold]
-    fn set_filter(&mut self, id: u32, filter: ProxyFilter) {
+    pub(super) fn set_filter(&mut self, id: u32, filter: ProxyFilter) {
         self.note_change(id);
         let i = self.at(id);
         self.filters[i] = filter;
@@ -314,7 +292,7 @@ impl Part<'_> {
     }
 
     #[inline(always)]
-    fn note_change(&mut self, id: u32) {
+    pub(super) fn note_change(&mut self, id: u32) {
         self.is_noted = true;
         let i = self.at(id);
         if self.states[i] & state::CHANGED == 0 {
