@@ -15,11 +15,10 @@ const IDS: u32 = 120;
 const ON_DEVICE: Config = Config { backend: Backend::Device, margin: 0.1, ..Config::DEFAULT };
 
 /// Faults that the core notices, or that are none.
-const HARMLESS: [Fault; 11] = [
+const HARMLESS: [Fault; 10] = [
     Fault::Nothing,
     Fault::Fails,
     Fault::Declines,
-    Fault::IsSlow,
     Fault::IsLost,
     Fault::Disorder,
     Fault::Twice,
