@@ -31,6 +31,18 @@ pub(crate) fn needles(n: usize) -> Vec<Aabb> {
     (0..n).map(needle).collect()
 }
 
+/// Runs work on a pool of threads.
+#[cfg(feature = "parallel")]
+pub(crate) fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads").install(work)
+}
+
+/// Runs work on the caller's thread, as there are no others.
+#[cfg(not(feature = "parallel"))]
+pub(crate) fn on_threads<T>(_: usize, work: impl FnOnce() -> T) -> T {
+    work()
+}
+
 /// Sets boxes without a filter.
 pub(crate) fn set(of: &mut BroadPhase, boxes: impl IntoIterator<Item = (u32, Aabb)>) {
     boxes.into_iter().for_each(|(id, aabb)| of.set(id, aabb, ProxyFilter::ALL).expect("a small id"));

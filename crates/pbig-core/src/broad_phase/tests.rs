@@ -1,7 +1,7 @@
 //! Updates that the suite does not reach from outside: their work, the ways they take, their threads. `tests/suite/incremental.rs` and
 //! the suite's checks of random bytes follow random worlds with every engine.
 
-use crate::fixtures::{assert_right, cube, lattice, met, random_point, set, update};
+use crate::fixtures::{assert_right, cube, lattice, met, on_threads, random_point, set, update};
 use crate::{Aabb, Algorithm, BroadPhase, Config, Engine, Error, ProxyFilter};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
@@ -95,7 +95,7 @@ fn many_boxes_set_on_threads_are_those_set_one_by_one() {
         many
     };
     for threads in [1, 2, 4] {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
+        on_threads(threads, || {
             let (mut many, ids) = (through_rounds(), (0..n).collect::<Vec<u32>>());
             let planted = |id: u32| if id == n - 5 { panic!("planted") } else { place(id, 7) };
             let panics = std::panic::AssertUnwindSafe(|| many.set_many(&ids, planted));
@@ -240,7 +240,7 @@ fn reports_of_given_up_ways_do_not_depend_on_threads() {
     let needles = crate::fixtures::needles(30_000);
     let grown = |id: u32, by: f32| (id, cube(lattice(id, 40).map(|x| x * 1.5), 0.1 + by));
     let told = |threads: usize| {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
+        on_threads(threads, || {
             let mut finder = crate::Finder::default();
             finder.find(&needles).unwrap();
             let mut told = vec![(finder.report().work, finder.report().plan.algorithm)];
