@@ -343,22 +343,18 @@ mod tests {
         let plate = |z: f32| Aabb::from_center([0.0, 0.0, z], [1.0, 1.0, 0.0]);
         let all = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
         let half = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, 0.0, f32::INFINITY]);
-        for near in [
-            (cube(0.0), cube(5.0)),
-            (cube(5.0), cube(0.0)),
-            (plate(0.0), plate(8.0)),
-            (all, cube(1e30)),
-            (half, all),
+        for (stored, now, has_jumped) in [
+            (cube(0.0), cube(5.0), false),
+            (cube(5.0), cube(0.0), false),
+            (plate(0.0), plate(8.0), false),
+            (all, cube(1e30), false),
+            (half, all, false),
+            (cube(0.0), cube(5.1), true),
+            (cube(5.1), cube(0.0), true),
+            (plate(0.0), plate(8.1), true),
+            (Aabb::NOWHERE, cube(0.0), true),
         ] {
-            assert!(!has_arrived(&near.0, &near.1), "{near:?}");
-        }
-        for far in [
-            (cube(0.0), cube(5.1)),
-            (cube(5.1), cube(0.0)),
-            (plate(0.0), plate(8.1)),
-            (Aabb::NOWHERE, cube(0.0)),
-        ] {
-            assert!(has_arrived(&far.0, &far.1), "{far:?}");
+            assert_eq!(has_arrived(&stored, &now), has_jumped, "{stored:?} {now:?}");
         }
     }
 }
