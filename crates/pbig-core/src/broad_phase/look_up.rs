@@ -2,7 +2,7 @@
 
 use super::Task;
 use super::world::World;
-use crate::bvh::BoxIndex;
+use crate::bvh::{BoxIndex, overlapping};
 use crate::pairs::{Differences, Kept, differences, equal, sort_few};
 use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy;
@@ -119,7 +119,8 @@ impl Thread {
         for &word in ids {
             let id = word as u32;
             thread.now.clear();
-            thread.nodes += index.overlaps(simd, &world.boxes[id as usize], |other| thread.now.push(other));
+            let aabb = &world.boxes[id as usize];
+            thread.nodes += overlapping(simd, index, aabb, |other| thread.now.push(other));
             thread.met += thread.now.len() as u64;
             thread.compare(simd, world, kept, id);
             let work = thread.nodes + thread.met;

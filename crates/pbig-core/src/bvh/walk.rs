@@ -119,9 +119,9 @@ fn push_all<T: Copy>(list: &mut ArrayVec<T, STACK>, numbers: &[T; LANES], count:
     list.truncate(len);
 }
 
-/// Calls `visit` with the id of each box that overlaps one, and returns the number of nodes looked at.
+/// Calls `visit` with the id of each box that overlaps one, and returns the number of nodes looked at, which are not counted for a sort.
 #[inline(always)]
-pub(super) fn overlapping(simd: impl Simd, index: &BoxIndex, aabb: &Aabb, mut visit: impl FnMut(u32)) -> u64 {
+pub(crate) fn overlapping(simd: impl Simd, index: &BoxIndex, aabb: &Aabb, mut visit: impl FnMut(u32)) -> u64 {
     if !aabb.is_valid() {
         return 0;
     }
