@@ -4,8 +4,7 @@ use super::{Finder, Sets};
 use crate::pairs::Grouping;
 use crate::parallel::{run_parts, threads_for};
 use crate::report::{Clock, stage};
-use crate::search::Receiver;
-use crate::search::Request;
+use crate::search::{Receiver, Request};
 use crate::{Boxes, CrossPair, Error, Order, Pair};
 
 /// Pairs whose ids a thread looks up at a time.
@@ -77,7 +76,7 @@ impl Finder {
     }
 
     /// Finds the pairs of two sets, for a receiver or as a list.
-    pub(super) fn search_between(
+    fn search_between(
         &mut self,
         a: &Boxes<'_>,
         b: &Boxes<'_>,
@@ -132,4 +131,4 @@ impl Finder {
 }
 
 /// Receiver of pairs of a search, and of the sets that name them.
-pub(super) type Visit<'a> = &'a (dyn Fn(&[Pair], &Sets) + Sync);
+type Visit<'a> = &'a (dyn Fn(&[Pair], &Sets) + Sync);
