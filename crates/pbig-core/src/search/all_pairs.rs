@@ -280,7 +280,7 @@ impl AllPairs {
     /// Forgets the pairs, and gives memory back if as many are expected.
     pub(crate) fn settle(&mut self, pairs: usize) {
         let share = pairs / self.hits.len().max(1);
-        self.hits.iter_mut().for_each(|hits| hits.found.settle(share));
+        self.hits.iter_mut().for_each(|hits| hits.found.pairs.settle_and_clear(share));
         self.answer.clear();
         self.answer.settle(pairs);
     }
