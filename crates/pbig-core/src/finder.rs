@@ -3,7 +3,7 @@
 use crate::memory::Scratch;
 use crate::pair_device::{PairDevice, SearchRequest};
 use crate::pairs::{Grouping, Groups};
-use crate::report::{Clock, Report, stage};
+use crate::report::{Report, stage};
 use crate::search::{AllPairs, DeviceSlot, Request, Store};
 use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Order, Pair, ProxyFilter};
 
@@ -194,14 +194,9 @@ impl Finder {
         let (Boxes { boxes, filters, .. }, Request { config, grouping, .. }) = (*all, *request);
         let (is_sorted, max_pairs) = (grouping.is_some(), config.limits.pairs());
         let request = SearchRequest { boxes, filters, is_sorted, max_pairs };
-        let pairs = std::mem::take(&mut self.pairs);
-        let (done, found) = self.device.find_all(&request, pairs, &mut self.report);
+        let is_in_order = self.device.find_all(&request, &mut self.pairs, &mut self.report)?;
+        let Some(is_in_order) = is_in_order else { return Ok(false) };
         self.count_invalid();
-        if !done? {
-            return Ok(false);
-        }
-        let is_in_order = found.is_in_order();
-        self.pairs = found.into_vec();
         if grouping.is_some() && !is_in_order {
             self.all_pairs.take(&mut self.pairs, grouping);
             self.emit(grouping);
@@ -222,16 +217,16 @@ impl Finder {
 
     /// Brings the pairs of all threads into one list, in order if there is a grouping.
     fn emit(&mut self, grouping: Option<Grouping>) {
-        stage!("emit");
-        let mut clock = Clock::start();
-        if let Some(grouping) = grouping {
-            self.groups.take_memory(&mut self.pairs);
-            self.all_pairs.gather(grouping, &mut self.groups);
-            self.groups.list(&mut self.pairs, self.all_pairs.hits.len());
-        } else {
-            self.all_pairs.list(&mut self.pairs);
-        }
-        self.report.stages.emit = clock.lap();
+        let Self { groups, all_pairs, pairs, report, .. } = self;
+        stage!(report, emit, {
+            if let Some(grouping) = grouping {
+                groups.take_memory(pairs);
+                all_pairs.gather(grouping, groups);
+                groups.list(pairs, all_pairs.hits.len());
+            } else {
+                all_pairs.list(pairs);
+            }
+        });
     }
 
     /// Returns the pairs of the last call that lists pairs of one set; none if it failed.

@@ -64,6 +64,8 @@ mod config;
 mod error;
 mod filter;
 mod finder;
+#[cfg(test)]
+mod fixtures;
 mod id_set;
 mod memory;
 pub mod oracle;

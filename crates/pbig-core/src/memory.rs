@@ -75,9 +75,9 @@ impl<T> ShrinkingVec<T> {
         }
     }
 
-    /// As [`ShrinkingVec::settle`], for as many elements as there are. Removes them.
-    pub(crate) fn settle_and_clear(&mut self) {
-        let needed = self.list.len();
+    /// As [`ShrinkingVec::settle`], for at least as many elements as there are. Removes them.
+    pub(crate) fn settle_and_clear(&mut self, needed: usize) {
+        let needed = needed.max(self.list.len());
         self.list.clear();
         self.settle(needed);
     }

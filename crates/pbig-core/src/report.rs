@@ -37,11 +37,21 @@ impl StageTimes {
 }
 
 /// A `tracing` span, target `pbig`, that lasts for the rest of the block: one for each stage, so that a
-/// profiler shows them. Without a subscriber it costs a comparison.
+/// profiler shows them. Without a subscriber it costs a comparison. With a report, the span lasts for an expression, whose time is added
+/// to the stage of that name.
 macro_rules! stage {
-    ($name:literal) => {
+    ($name:expr) => {
         let _span = tracing::debug_span!(target: "pbig", $name).entered();
     };
+    ($report:expr, $stage:ident, $work:expr) => {{
+        let mut clock = $crate::report::Clock::start();
+        let result = {
+            $crate::report::stage!(stringify!($stage));
+            $work
+        };
+        $report.stages.$stage += clock.lap();
+        result
+    }};
 }
 pub(crate) use stage;
 

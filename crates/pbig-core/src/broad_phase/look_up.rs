@@ -2,11 +2,11 @@
 
 use super::Task;
 use super::world::World;
-use crate::bvh::BoxIndex;
+use crate::bvh::{BoxIndex, overlapping};
 use crate::pairs::{Differences, Kept, differences, equal, sort_few};
 use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy;
-use crate::report::{Clock, stage};
+use crate::report::stage;
 use crate::search::Budget;
 use crate::simd::{BLOCK, Simd, dispatch};
 use crate::{Algorithm, Checks, Engine, Pair, Plan};
@@ -24,20 +24,18 @@ pub(super) struct LookUp {
 impl LookUp {
     /// Brings the tree up to date, and leaves the events of an update in the task. Returns false if it takes too much work.
     pub(super) fn run(&mut self, task: &mut Task<'_>) -> bool {
-        let (world, mut clock) = (task.world, Clock::start());
-        let (index, read) = {
-            stage!("map");
-            task.tree.refresh_for_look_ups(world)
-        };
-        index.in_order(&world.changed, &mut self.order);
-        task.kept.make_backward();
-        drop_pairs_of_removed(&world.removed, task.kept, &mut task.comparison.events.removed);
-        task.report.stages.map += clock.lap();
-        stage!("check");
+        let world = task.world;
+        let (index, read) = stage!(task.report, map, {
+            let (index, read) = task.tree.refresh_for_look_ups(world);
+            index.in_order(&world.changed, &mut self.order);
+            task.kept.make_backward();
+            drop_pairs_of_removed(&world.removed, task.kept, &mut task.comparison.events.removed);
+            (index, read)
+        });
         let is_forced = task.config.engine == Some(Engine::LookUp);
         let most = if is_forced { u64::MAX } else { policy::look_up_to_nodes(world.present.len()) };
         let budget = Budget::new(most);
-        self.look_up((world, task.kept, index), &budget);
+        stage!(task.report, check, self.look_up((world, task.kept, index), &budget));
         let events = &mut task.comparison.events;
         events.gather(self.threads.iter().map(|thread| &thread.found));
         let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
@@ -50,7 +48,6 @@ impl LookUp {
             (nodes, met) = (most, 0);
         }
         let (report, made) = (&mut *task.report, nodes * BLOCK as u64);
-        report.stages.check += clock.lap();
         report.checks = Checks { made, unnecessary: made - met, redundant: 0 };
         report.work += read as u64 + made + nodes + met;
         report.set_plan(Plan { algorithm: Algorithm::LookUp, boxes: world.noted.valid, ..Plan::default() });
@@ -122,7 +119,8 @@ impl Thread {
         for &word in ids {
             let id = word as u32;
             thread.now.clear();
-            thread.nodes += index.overlaps(simd, &world.boxes[id as usize], |other| thread.now.push(other));
+            let aabb = &world.boxes[id as usize];
+            thread.nodes += overlapping(simd, index, aabb, |other| thread.now.push(other));
             thread.met += thread.now.len() as u64;
             thread.compare(simd, world, kept, id);
             let work = thread.nodes + thread.met;

@@ -146,11 +146,9 @@ impl BroadPhase {
     /// or more, and over 64 times [`BroadPhase::id_count`].
     #[inline(always)]
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
-        if self.world.set(id, aabb, filter, self.config.margin) {
-            Ok(())
-        } else {
-            self.insert(id, aabb, filter)
-        }
+        let margin = self.config.margin;
+        let is_set = self.world.set(id, aabb, filter, margin);
+        if is_set { Ok(()) } else { self.insert(id, aabb, filter) }
     }
 
     /// Sets many boxes, as [`BroadPhase::set`] does one, in the order of `ids`. Many ascending ids are shared among rayon's threads; boxes
@@ -215,7 +213,8 @@ impl BroadPhase {
     /// Moves a box that keeps its filter. Returns false when there is none.
     #[inline(always)]
     pub fn set_aabb(&mut self, id: u32, aabb: Aabb) -> bool {
-        self.world.set_aabb(id, aabb, self.config.margin)
+        let margin = self.config.margin;
+        self.world.set_aabb(id, aabb, margin)
     }
 
     #[cold]
@@ -239,7 +238,7 @@ impl BroadPhase {
     pub fn set_filter(&mut self, id: u32, filter: ProxyFilter) -> bool {
         let has_box = self.world.contains(id);
         if has_box && self.world.filters[id as usize] != filter {
-            self.world.set_filter(id, filter);
+            self.world.change(|all| all.set_filter(id, filter));
         }
         has_box
     }

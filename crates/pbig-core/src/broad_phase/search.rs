@@ -5,7 +5,7 @@ use super::Task;
 use super::world::World;
 use crate::pairs::{Grouping, Groups, Kept};
 use crate::policy;
-use crate::report::{Clock, stage};
+use crate::report::stage;
 use crate::search::{AllPairs, DeviceSlot, Request, Store};
 use crate::{Aabb, Algorithm, Boxes, Error, Pair, ProxyFilter};
 
@@ -47,9 +47,7 @@ impl Search {
         if self.store.has_tree && !is_on_device && !is_listed {
             task.tree.adopt(&mut self.store.tree);
         }
-        let mut clock = Clock::start();
-        self.compare(task, is_on_device, is_listed);
-        task.report.stages.diff += clock.lap();
+        stage!(task.report, diff, self.compare(task, is_on_device, is_listed));
         Ok(true)
     }
 
@@ -69,7 +67,6 @@ impl Search {
     }
 
     fn compare(&mut self, task: &mut Task<'_>, is_on_device: bool, is_listed: bool) {
-        stage!("diff");
         let algorithm = task.report.plan.algorithm;
         let is_brute = !is_on_device && matches!(algorithm, Algorithm::Brute | Algorithm::Nothing);
         let world = task.world;

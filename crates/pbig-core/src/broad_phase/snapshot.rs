@@ -80,7 +80,7 @@ impl Snapshot {
         }
         // Only the changes of the snapshot count, not these insertions. Saved pairs are trusted, as those of an update are.
         world.forget_changes();
-        self.changed.iter().for_each(|&id| world.note_change(id));
+        world.change(|all| self.changed.iter().for_each(|id| all.note_change(*id)));
         restored.kept.reserve_ids(self.boxes.len());
         restored.kept.apply(&self.pairs, &[]);
         Ok(restored)

@@ -3,7 +3,7 @@
 use super::tree::Tree;
 use super::{BroadPhase, Events, Task};
 use crate::pairs::Differences;
-use crate::policy;
+use crate::policy::{self, GivenUp};
 use crate::report::{Clock, Report};
 use crate::{Backend, Engine, Error, Plan};
 
@@ -52,48 +52,21 @@ impl BroadPhase {
     }
 
     fn find_events(&mut self, tree: &mut Tree) -> Result<(), Error> {
-        if self.device.is_wanted(self.config.backend, None, &mut self.report) && self.search(tree, true)? {
+        let Self { device, look_up, search, given_up, world, config, kept, comparison, report, .. } = self;
+        let mut task = Task { world, tree, config, kept, comparison, report };
+        if device.is_wanted(config.backend, None, task.report) && search.run(&mut task, Some(device))? {
             return Ok(());
         }
-        let changed = self.world.changed.len();
-        if self.chooses_look_ups(tree, changed) {
-            let is_done = self.look_up(tree);
-            self.given_up.note(!is_done, changed);
+        if task.chooses_look_ups(given_up) {
+            let is_done = look_up.run(&mut task);
+            given_up.note(!is_done, world.changed.len());
             if is_done {
                 return Ok(());
             }
         }
-        let is_done = self.search(tree, false)?;
+        let is_done = search.run(&mut task, None)?;
         debug_assert!(is_done, "a search on the CPU never gives up");
         Ok(())
-    }
-
-    /// Looks the changed boxes up. Returns false if that takes too much work.
-    fn look_up(&mut self, tree: &mut Tree) -> bool {
-        let Self { look_up, world, config, kept, comparison, report, .. } = self;
-        look_up.run(&mut Task { world, tree, config, kept, comparison, report })
-    }
-
-    /// Searches all boxes, on the device or the CPU. Returns false if the device could not do it.
-    fn search(&mut self, tree: &mut Tree, is_on_device: bool) -> Result<bool, Error> {
-        let Self { device, search, world, config, kept, comparison, report, .. } = self;
-        let mut task = Task { world, tree, config, kept, comparison, report };
-        search.run(&mut task, is_on_device.then_some(device))
-    }
-
-    /// Chooses whether the changed boxes are looked up. A search that is made because look-ups were given up counts as one of those to come.
-    fn chooses_look_ups(&mut self, tree: &mut Tree, changed: usize) -> bool {
-        match self.config.engine {
-            _ if self.config.backend == Backend::Brute => return false,
-            Some(engine) => return engine == Engine::LookUp,
-            None => {}
-        }
-        let boxes = self.world.present.len();
-        if !policy::may_look_up(boxes, changed) || self.given_up.forbids(changed) {
-            return false;
-        }
-        let arrived = (self.world.noted.arrived as usize).min(changed);
-        policy::may_place(boxes, arrived) || policy::may_place(boxes, tree.arrivals(&self.world))
     }
 
     /// Keeps the added pairs, and forgets the ended ones, unless the search has replaced the kept pairs.
@@ -134,5 +107,24 @@ impl BroadPhase {
             fallback,
             ..Report::default()
         };
+    }
+}
+
+impl Task<'_> {
+    /// Chooses whether the changed boxes are looked up. A search that is made because look-ups were given up counts as one of those to
+    /// come without them.
+    fn chooses_look_ups(&mut self, given_up: &mut GivenUp) -> bool {
+        let world = self.world;
+        match self.config.engine {
+            _ if self.config.backend == Backend::Brute => return false,
+            Some(engine) => return engine == Engine::LookUp,
+            None => {}
+        }
+        let (boxes, changed) = (world.present.len(), world.changed.len());
+        if !policy::may_look_up(boxes, changed) || given_up.forbids(changed) {
+            return false;
+        }
+        let arrived = (world.noted.arrived as usize).min(changed);
+        policy::may_place(boxes, arrived) || policy::may_place(boxes, self.tree.arrivals(world))
     }
 }

@@ -109,7 +109,7 @@ impl World {
     }
 
     /// Runs a change on all boxes.
-    fn change(&mut self, change: impl FnOnce(&mut Part<'_, &mut Vec<u32>>)) {
+    pub(super) fn change(&mut self, change: impl FnOnce(&mut Part<'_, &mut Vec<u32>>)) {
         let mut all = self.all();
         change(&mut all);
         let is_noted = all.is_noted;
@@ -202,16 +202,6 @@ impl World {
         all_absent
     }
 
-    #[cfg(feature = "serde")]
-    pub(super) fn note_change(&mut self, id: u32) {
-        self.change(|all| all.note_change(id));
-    }
-
-    #[cold]
-    pub(super) fn set_filter(&mut self, id: u32, filter: ProxyFilter) {
-        self.change(|all| all.set_filter(id, filter));
-    }
-
     /// Inserts a box that is not present; its id is known.
     #[cold]
     pub(super) fn insert(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) {
@@ -278,7 +268,7 @@ struct Moved {
 }
 
 /// A list of ids that have changed.
-trait List {
+pub(super) trait List {
     fn add(&mut self, id: u32);
 }
 
@@ -304,7 +294,7 @@ impl List for Room<'_> {
 }
 
 /// The boxes of all ids, or those of some consecutive ones, and where their changes are noted.
-struct Part<'a, L> {
+pub(super) struct Part<'a, L> {
     first: u32,
     boxes: &'a mut [Aabb],
     filters: &'a mut [ProxyFilter],
@@ -321,7 +311,7 @@ impl<L: List> Part<'_, L> {
     /// A valid stored box is present, so its state is not read if it holds the new box. Its filter is read only if any box was
     /// ever filtered.
     #[inline(always)]
-    fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
+    pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
         if !self.set_aabb(id, aabb, margin) {
             return false;
         }
@@ -339,7 +329,7 @@ impl<L: List> Part<'_, L> {
 
     /// As [`Part::set`], with the filter that the box has.
     #[inline(always)]
-    fn set_aabb(&mut self, id: u32, aabb: Aabb, margin: f32) -> bool {
+    pub(super) fn set_aabb(&mut self, id: u32, aabb: Aabb, margin: f32) -> bool {
         let i = self.at(id);
         let Some(fat) = self.boxes.get(i) else { return false };
         let gaps = one_box::gaps_are_within(&aabb, fat, slack(margin));
@@ -355,7 +345,7 @@ impl<L: List> Part<'_, L> {
     }
 
     #[cold]
-    fn set_filter(&mut self, id: u32, filter: ProxyFilter) {
+    pub(super) fn set_filter(&mut self, id: u32, filter: ProxyFilter) {
         self.note_change(id);
         let i = self.at(id);
         self.filters[i] = filter;
@@ -378,7 +368,7 @@ impl<L: List> Part<'_, L> {
     }
 
     #[inline(always)]
-    fn note_change(&mut self, id: u32) {
+    pub(super) fn note_change(&mut self, id: u32) {
         self.is_noted = true;
         let i = self.at(id);
         if self.states[i] & state::CHANGED == 0 {
@@ -430,22 +420,18 @@ mod tests {
         let plate = |z: f32| Aabb::from_center([0.0, 0.0, z], [1.0, 1.0, 0.0]);
         let all = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
         let half = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, 0.0, f32::INFINITY]);
-        for near in [
-            (cube(0.0), cube(5.0)),
-            (cube(5.0), cube(0.0)),
-            (plate(0.0), plate(8.0)),
-            (all, cube(1e30)),
-            (half, all),
+        for (stored, now, has_jumped) in [
+            (cube(0.0), cube(5.0), false),
+            (cube(5.0), cube(0.0), false),
+            (plate(0.0), plate(8.0), false),
+            (all, cube(1e30), false),
+            (half, all, false),
+            (cube(0.0), cube(5.1), true),
+            (cube(5.1), cube(0.0), true),
+            (plate(0.0), plate(8.1), true),
+            (Aabb::NOWHERE, cube(0.0), true),
         ] {
-            assert!(!has_arrived(&near.0, &near.1), "{near:?}");
-        }
-        for far in [
-            (cube(0.0), cube(5.1)),
-            (cube(5.1), cube(0.0)),
-            (plate(0.0), plate(8.1)),
-            (Aabb::NOWHERE, cube(0.0)),
-        ] {
-            assert!(has_arrived(&far.0, &far.1), "{far:?}");
+            assert_eq!(has_arrived(&stored, &now), has_jumped, "{stored:?} {now:?}");
         }
     }
 }

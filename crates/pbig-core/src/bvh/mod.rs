@@ -15,16 +15,17 @@ mod query;
 mod refit;
 mod sort;
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;
 mod walk;
 
 use crate::policy;
-use crate::simd::{Simd, dispatch};
+use crate::simd::dispatch;
 use crate::{Aabb, OccupiedCell};
 use node::Node;
-pub(crate) use node::{LANES, NONE, next};
+pub(crate) use node::{LANES, NONE};
 use query::Cast;
 use std::sync::atomic::{AtomicU64, Ordering};
+pub(crate) use walk::overlapping;
 
 /// Boxes by id, for queries about places: which boxes does a ray, a moving box, a box or a point meet?
 ///
@@ -134,12 +135,6 @@ impl BoxIndex {
     #[inline(always)]
     pub fn overlapping(&self, aabb: &Aabb, visit: impl FnMut(u32)) -> u64 {
         self.note(dispatch!(walk::overlapping, self, aabb, visit))
-    }
-
-    /// As [`BoxIndex::overlapping`], within a kernel. Nodes are not counted for a sort.
-    #[inline(always)]
-    pub(crate) fn overlaps(&self, simd: impl Simd, aabb: &Aabb, visit: impl FnMut(u32)) -> u64 {
-        walk::overlapping(simd, self, aabb, visit)
     }
 
     /// Counts nodes that look-ups have looked at. Those that were given up count as a sort, unless boxes were sorted just now.

@@ -89,12 +89,3 @@ pub(crate) fn extent_sum(aabb: &Aabb) -> f32 {
     }
     (0..3).map(|k| aabb.max[k] - aabb.min[k]).sum()
 }
-
-/// Takes the lowest bit out of a mask, and returns its number.
-#[inline(always)]
-pub(crate) fn next(mask: &mut u32) -> Option<usize> {
-    let lane = mask.trailing_zeros() as usize;
-    let is_any = *mask != 0;
-    *mask &= mask.wrapping_sub(1);
-    is_any.then_some(lane)
-}

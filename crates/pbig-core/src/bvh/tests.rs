@@ -1,6 +1,7 @@
 //! The index gives the answers of a scan of all boxes, after all kinds of changes, and looks at few boxes.
 
 use super::{BoxIndex, LANES, NONE};
+use crate::fixtures::{cube, random_point};
 use crate::simd::{Portable, Simd};
 use crate::{Aabb, Config, Engine, Finder};
 use rand::rngs::StdRng;
@@ -11,9 +12,9 @@ fn random_box(rng: &mut StdRng, reach: f32) -> Aabb {
         0 => return Aabb::NOWHERE,
         1 => [reach, 0.1, reach],
         2 => [f32::INFINITY, 0.1, f32::INFINITY],
-        _ => [0.0; 3].map(|_: f32| rng.random_range(0.0..0.6)),
+        _ => random_point(rng, 0.0..0.6),
     };
-    Aabb::from_center([0.0; 3].map(|_: f32| rng.random_range(-reach..reach)), half)
+    Aabb::from_center(random_point(rng, -reach..reach), half)
 }
 
 /// Returns the times at which a box meets another one that stays, in f64; none if it never does before `max_time`.
@@ -50,12 +51,19 @@ fn met(index: &BoxIndex, start: &Aabb, velocity: [f32; 3], max_time: f32) -> Vec
     found
 }
 
+/// Returns the boxes that overlap one, sorted.
+fn overlapping(index: &BoxIndex, aabb: &Aabb) -> Vec<u32> {
+    let mut met = vec![];
+    index.overlapping(aabb, |id| met.push(id));
+    met.sort_unstable();
+    met
+}
+
 /// Asks one query of each kind, and compares with a scan.
 fn check(index: &BoxIndex, boxes: &[Aabb], rng: &mut StdRng, reach: f32) {
-    let start = Aabb::from_center(
-        [0.0; 3].map(|_: f32| rng.random_range(-reach..reach)),
-        [0.0; 3].map(|_: f32| if rng.random_range(0..2) == 0 { 0.0 } else { 0.3 }),
-    );
+    let half = [0.0, 0.3];
+    let start =
+        Aabb::from_center(random_point(rng, -reach..reach), [0; 3].map(|_| half[rng.random_range(0..2)]));
     let velocity =
         [0.0; 3].map(|_: f32| if rng.random_range(0..3) == 0 { 0.0 } else { rng.random_range(-1.0..1.0) });
     let max_time = [0.0, 5.0, f32::MAX, f32::INFINITY][rng.random_range(0..4)];
@@ -198,7 +206,7 @@ fn a_missed_box_is_noticed() {
 
 fn scattered(n: usize) -> Vec<Aabb> {
     let (mut rng, side) = (StdRng::seed_from_u64(9), (n as f32 * 4.0).cbrt());
-    (0..n).map(|_| Aabb::from_center([0.0; 3].map(|_: f32| rng.random_range(0.0..side)), [0.4; 3])).collect()
+    (0..n).map(|_| cube(random_point(&mut rng, 0.0..side), 0.4)).collect()
 }
 
 /// Casts rays to the first box. Returns the nodes that the last one hundred looked at, and the boxes that they visited.
@@ -206,8 +214,7 @@ fn cast(index: &mut BoxIndex, boxes: &[Aabb], rays: usize) -> (u64, u64) {
     let (mut rng, mut nodes, mut visited) = (StdRng::seed_from_u64(3), 0, 0);
     let side = (boxes.len() as f32 * 4.0).cbrt();
     for ray in 0..rays {
-        let from = [0.0; 3].map(|_: f32| rng.random_range(0.0..side));
-        let along = [0.0; 3].map(|_: f32| rng.random_range(-1.0..1.0));
+        let (from, along) = (random_point(&mut rng, 0.0..side), random_point(&mut rng, -1.0..1.0));
         let (start, mut first) = (Aabb::new(from, from), f32::MAX);
         let is_counted = ray + 100 >= rays;
         let looked_at = index.cast_aabb(&start, along, f32::MAX, |id| {
@@ -388,7 +395,7 @@ fn queries_with_nans_visit_nothing() {
 fn a_crowd_does_not_test_the_points_around_it() {
     let mut random = StdRng::seed_from_u64(4);
     let mut point = |i: usize| {
-        let mut at = [0; 3].map(|_| random.random_range(0.0f32..1.0));
+        let mut at = random_point(&mut random, 0.0..1.0);
         at[i % 3] = [-1e-4, 1.0001][i / 3 % 2];
         Aabb::new(at, at)
     };
@@ -407,26 +414,13 @@ fn a_crowd_does_not_test_the_points_around_it() {
     assert!(ratios[1] < 0.25 * crate::WORK_LIMIT as f64, "{ratios:?}");
 }
 
-/// Returns boxes that cross in three directions, and that no tree can cut apart.
-pub(crate) fn needles(n: usize) -> Vec<Aabb> {
-    let mut random = StdRng::seed_from_u64(1);
-    let needle = |i: usize| {
-        let (mut at, mut half) = ([0; 3].map(|_| random.random_range(0.0f32..1.0)), [1e-9; 3]);
-        (at[i % 3], half[i % 3]) = (0.5, 0.5);
-        Aabb::from_center(at, half)
-    };
-    (0..n).map(needle).collect()
-}
-
 #[test]
 fn a_box_without_bounds_meets_no_removed_one() {
     let unit = Aabb::new([0.0; 3], [1.0; 3]);
     let mut index = BoxIndex::default();
     index.refresh(&[unit; 2], None);
     index.refresh(&[unit, Aabb::NOWHERE], Some(&[1]));
-    let mut met = vec![];
-    index.overlapping(&Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]), |id| met.push(id));
-    assert_eq!(met, [0]);
+    assert_eq!(overlapping(&index, &Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3])), [0]);
 }
 
 #[test]
@@ -434,12 +428,6 @@ fn ids_beyond_a_shorter_list_are_not_visited() {
     let unit = Aabb::new([0.0; 3], [1.0; 3]);
     let (mut index, mut boxes) = (BoxIndex::default(), vec![unit; 100]);
     index.refresh(&boxes, None);
-    let visited = |index: &BoxIndex| {
-        let mut met = vec![];
-        index.overlapping(&unit, |id| met.push(id));
-        met.sort_unstable();
-        met
-    };
     for (len, changed) in
         [(50, Some(&[][..])), (60, Some(&[59])), (40, Some(&[7])), (30, None), (5, Some(&[]))]
     {
@@ -448,7 +436,7 @@ fn ids_beyond_a_shorter_list_are_not_visited() {
         index.refresh(&boxes, changed);
         let stale = if len > before { before as u32..len as u32 - 1 } else { 0..0 };
         let wanted: Vec<u32> = (0..len as u32).filter(|id| !stale.contains(id)).collect();
-        assert_eq!(visited(&index), wanted, "{len}");
+        assert_eq!(overlapping(&index, &unit), wanted, "{len}");
     }
 }
 

@@ -1,10 +1,10 @@
 //! Walking the nodes that a query meets, about the nearest first.
 
 use super::BoxIndex;
-use super::node::{LANES, Lanes, next};
+use super::node::{LANES, Lanes};
 use super::query::{Cast, Near, Query};
 use crate::Aabb;
-use crate::simd::{Eight, Simd};
+use crate::simd::{Eight, Simd, next};
 use arrayvec::ArrayVec;
 
 /// Maximum number of nodes that wait: seven for each level and one more, and 2^32 boxes of 448 classes make 14 levels.
@@ -119,9 +119,9 @@ fn push_all<T: Copy>(list: &mut ArrayVec<T, STACK>, numbers: &[T; LANES], count:
     list.truncate(len);
 }
 
-/// Calls `visit` with the id of each box that overlaps one, and returns the number of nodes looked at.
+/// Calls `visit` with the id of each box that overlaps one, and returns the number of nodes looked at, which are not counted for a sort.
 #[inline(always)]
-pub(super) fn overlapping(simd: impl Simd, index: &BoxIndex, aabb: &Aabb, mut visit: impl FnMut(u32)) -> u64 {
+pub(crate) fn overlapping(simd: impl Simd, index: &BoxIndex, aabb: &Aabb, mut visit: impl FnMut(u32)) -> u64 {
     if !aabb.is_valid() {
         return 0;
     }

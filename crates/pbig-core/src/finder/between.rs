@@ -4,8 +4,7 @@ use super::{Finder, Sets};
 use crate::pairs::Grouping;
 use crate::parallel::{run_parts, threads_for};
 use crate::report::{Clock, stage};
-use crate::search::Receiver;
-use crate::search::Request;
+use crate::search::{Receiver, Request};
 use crate::{Boxes, CrossPair, Error, Order, Pair};
 
 /// Pairs whose ids a thread looks up at a time.
@@ -77,7 +76,7 @@ impl Finder {
     }
 
     /// Finds the pairs of two sets, for a receiver or as a list.
-    pub(super) fn search_between(
+    fn search_between(
         &mut self,
         a: &Boxes<'_>,
         b: &Boxes<'_>,
@@ -118,19 +117,18 @@ impl Finder {
     }
 
     fn name_ids(&mut self) {
-        stage!("emit");
-        let mut clock = Clock::start();
         let sets = &self.sets;
         let pieces = self.pairs_between.len().div_ceil(PIECE);
-        run_parts(threads_for(pieces), self.pairs_between.chunks_mut(PIECE), |_, pairs| {
+        let name = |_, pairs: &mut [Pair]| {
             for pair in pairs {
                 let CrossPair { a, b } = sets.named(pair);
                 *pair = Pair { a, b };
             }
-        });
-        self.report.stages.emit += clock.lap();
+        };
+        let parts = self.pairs_between.chunks_mut(PIECE);
+        stage!(self.report, emit, run_parts(threads_for(pieces), parts, name));
     }
 }
 
 /// Receiver of pairs of a search, and of the sets that name them.
-pub(super) type Visit<'a> = &'a (dyn Fn(&[Pair], &Sets) + Sync);
+type Visit<'a> = &'a (dyn Fn(&[Pair], &Sets) + Sync);

@@ -24,7 +24,8 @@ impl Differences {
 
     /// Forgets the pairs, and gives back a piece of the memory that fewer of them than before do not need.
     pub(crate) fn settle_and_clear(&mut self) {
-        [&mut self.added, &mut self.removed].into_iter().for_each(ShrinkingVec::settle_and_clear);
+        self.added.settle_and_clear(0);
+        self.removed.settle_and_clear(0);
     }
 
     /// Takes the pairs of several threads, one behind the other.

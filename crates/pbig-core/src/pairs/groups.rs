@@ -96,13 +96,6 @@ impl Found {
         self.pairs.extend_from_slice(pairs);
         self.count(from);
     }
-
-    /// Forgets the pairs, and gives back memory if as many as `needed` are expected.
-    pub(crate) fn settle(&mut self, needed: usize) {
-        let needed = needed.max(self.pairs.len());
-        self.pairs.clear();
-        self.pairs.settle(needed);
-    }
 }
 
 /// Pairs by group, with the buffers to sort them.

@@ -3,7 +3,7 @@
 use super::compare::Differences;
 use crate::Pair;
 use crate::id_set::IdSet;
-use crate::simd::Simd;
+use crate::simd::{Simd, next};
 use std::ops::Range;
 
 /// Ids of a row that one register holds.
@@ -111,9 +111,8 @@ pub(super) fn compare(
 /// Appends the pairs of `a` with the elements of a mask.
 #[inline(always)]
 fn push(a: u32, row: &[u32; SHORT], mut mask: u32, pairs: &mut Vec<Pair>) {
-    while mask != 0 {
-        pairs.push(Pair { a, b: row[mask.trailing_zeros() as usize % SHORT] });
-        mask &= mask - 1;
+    while let Some(lane) = next(&mut mask) {
+        pairs.push(Pair { a, b: row[lane % SHORT] });
     }
 }
 

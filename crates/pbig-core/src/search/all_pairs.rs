@@ -10,7 +10,7 @@ use crate::memory::{Scratch, ShrinkingVec};
 use crate::pairs::{Grouping, Groups};
 use crate::parallel::{available_threads, piece_range, run_with};
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
-use crate::report::{Checks, Clock, Report, stage};
+use crate::report::{Checks, Report, stage};
 use crate::{
     Aabb, Algorithm, Backend, Boxes, Config, Engine, Error, Keys, Pair, Plan, ProxyFilter, SearchRequest,
 };
@@ -155,15 +155,14 @@ impl AllPairs {
     }
 
     fn test_all(&mut self, request: &Request<'_>, rule: &Rule<'_>, report: &mut Report) {
-        stage!("check");
-        let mut clock = Clock::start();
-        let boxes = match request.others {
-            Some(others) => brute_force_across(request.boxes, others, rule, &mut self.hits),
-            None => brute_force(request.boxes, rule, &mut self.hits[0]),
-        };
+        let boxes = stage!(report, check, {
+            match request.others {
+                Some(others) => brute_force_across(request.boxes, others, rule, &mut self.hits),
+                None => brute_force(request.boxes, rule, &mut self.hits[0]),
+            }
+        });
         let algorithm = if boxes < 2 { Algorithm::Nothing } else { Algorithm::Brute };
         report.set_plan(Plan { algorithm, boxes: boxes as u32, ..Plan::default() });
-        report.stages.check += clock.lap();
     }
 
     fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, report: &mut Report) {
@@ -196,31 +195,22 @@ impl AllPairs {
         report: &mut Report,
     ) -> bool {
         let (boxes, workers) = (request.boxes, self.hits.len());
-        let mut clock = Clock::start();
-        let cells = {
-            stage!("plan");
-            Cells::new(boxes, request.others, workers)
-        };
-        report.stages.plan += clock.lap();
-        let sorted = {
-            stage!("map");
+        let cells = stage!(report, plan, Cells::new(boxes, request.others, workers));
+        let sorted = stage!(report, map, {
             match request.others {
                 Some(others) => store.two_grids.build(cells, [boxes, others], workers),
                 None => store.grid.build(cells, boxes, workers),
             }
-        };
-        report.stages.map += clock.lap();
+        });
         report.set_plan(cells.told(sorted.boxes(), sorted.oversize_count()));
-        stage!("check");
         let most = search::grid_up_to_work(sorted.boxes());
         // A receiver's search runs twice if it may fail, so it may as well take twice the budget.
-        let is_sure = request.config.engine == Some(Engine::Grid)
-            || rule.receiver.is_some() && sorted.takes_at_most(2 * most);
-        let is_done = self.run_within((!is_sure).then_some(most), request, rule, report, |rule, hits| {
-            sorted.search(rule, hits);
-        });
-        report.stages.check += clock.lap();
-        is_done
+        let is_forced = request.config.engine == Some(Engine::Grid);
+        stage!(report, check, {
+            let is_sure = is_forced || rule.receiver.is_some() && sorted.takes_at_most(2 * most);
+            let search = |rule: &Rule<'_>, hits: &mut [Hits]| sorted.search(rule, hits);
+            self.run_within((!is_sure).then_some(most), request, rule, report, search)
+        })
     }
 
     /// Finds the pairs in a tree of all boxes. Returns false if that takes too much work.
@@ -231,33 +221,26 @@ impl AllPairs {
         rule: &Rule<'_>,
         report: &mut Report,
     ) -> bool {
-        let mut clock = Clock::start();
-        let (boxes, split) = request.in_one_list(both_sets);
-        {
-            stage!("map");
+        let split = stage!(report, map, {
+            let (boxes, split) = request.in_one_list(both_sets);
             tree.sort_sets(boxes, split);
-        }
+            split
+        });
         *has_tree = true;
-        report.stages.map += clock.lap();
-        stage!("check");
         report.set_plan(Plan { algorithm: Algorithm::Tree, boxes: tree.len() as u32, ..Plan::default() });
         let most = search::join_up_to_work(tree.len());
         let most = (request.config.engine != Some(Engine::Tree)).then_some(most);
-        let is_done = self.run_within(most, request, rule, report, |rule, hits| {
-            join::find_pairs(tree, split, rule, hits);
-        });
-        report.stages.check += clock.lap();
-        is_done
+        let search = |rule: &Rule<'_>, hits: &mut [Hits]| join::find_pairs(tree, split, rule, hits);
+        stage!(report, check, self.run_within(most, request, rule, report, search))
     }
 
     /// Finds the pairs by streamed segment trees: a tree does not cut boxes apart that cross.
     fn stream(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, report: &mut Report) {
-        stage!("check");
-        let mut clock = Clock::start();
-        let (boxes, split) = request.in_one_list(&mut store.both_sets);
-        let valid = streamed::find_pairs(boxes, split, rule, &mut self.hits);
+        let valid = stage!(report, check, {
+            let (boxes, split) = request.in_one_list(&mut store.both_sets);
+            streamed::find_pairs(boxes, split, rule, &mut self.hits)
+        });
         report.set_plan(Plan { algorithm: Algorithm::Tree, boxes: valid as u32, ..Plan::default() });
-        report.stages.check += clock.lap();
     }
 
     /// Runs a search that may take at most some work in vain, or any. Returns false, and leaves no pairs, if it takes more. A receiver
@@ -297,7 +280,7 @@ impl AllPairs {
     /// Forgets the pairs, and gives memory back if as many are expected.
     pub(crate) fn settle(&mut self, pairs: usize) {
         let share = pairs / self.hits.len().max(1);
-        self.hits.iter_mut().for_each(|hits| hits.found.settle(share));
+        self.hits.iter_mut().for_each(|hits| hits.found.pairs.settle_and_clear(share));
         self.answer.clear();
         self.answer.settle(pairs);
     }
@@ -315,13 +298,13 @@ impl AllPairs {
         let max_pairs = config.limits.pairs();
         // Rows are sorted later, by several threads.
         let request = SearchRequest { boxes, filters, is_sorted: false, max_pairs };
-        let (done, found) = device.find_all(&request, std::mem::take(&mut self.answer), report);
-        let mut found = found.into_vec();
-        if done == Ok(true) {
+        let mut found = std::mem::take(&mut *self.answer);
+        let is_found = device.find_all(&request, &mut found, report).map(|found| found.is_some());
+        if is_found == Ok(true) {
             self.take(&mut found, grouping);
         }
         *self.answer = found;
-        done
+        is_found
     }
 
     /// Takes pairs that a device has found. Several threads copy and count them.

@@ -2,7 +2,7 @@
 
 use super::hits::{Hits, Rule};
 use crate::parallel::run_with;
-use crate::simd::{BLOCK, EightBoxes, Simd, dispatch};
+use crate::simd::{BLOCK, EightBoxes, Simd, dispatch, next};
 use crate::{Aabb, Pair};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -51,10 +51,8 @@ fn test_all(
         for (block, Block(eight)) in blocks.iter().enumerate().skip(i / BLOCK) {
             let mut met = simd.overlaps_eight(eight, aabb) & wanted;
             wanted = 255;
-            while met != 0 {
-                let b = ids[block * BLOCK + met.trailing_zeros() as usize];
-                hits.found.pairs.push(Pair { a: id, b });
-                met &= met - 1;
+            while let Some(lane) = next(&mut met) {
+                hits.found.pairs.push(Pair { a: id, b: ids[block * BLOCK + lane] });
             }
         }
         hits.tests += (ids.len() - 1 - i) as u64;
@@ -101,9 +99,8 @@ fn test_piece(
         valid += 1;
         for (block, Block(eight)) in blocks.iter().enumerate() {
             let mut met = simd.overlaps_eight(eight, aabb);
-            while met != 0 {
-                hits.found.pairs.push(Pair::new(ids[block * BLOCK + met.trailing_zeros() as usize], id));
-                met &= met - 1;
+            while let Some(lane) = next(&mut met) {
+                hits.found.pairs.push(Pair::new(ids[block * BLOCK + lane], id));
             }
         }
         from = hits.keep_many(from, rule);

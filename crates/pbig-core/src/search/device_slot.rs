@@ -3,7 +3,7 @@
 use crate::pair_device::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 use crate::policy::no_device;
 use crate::report::{Clock, Report, stage};
-use crate::{Algorithm, Backend, Error, Pair, PairList, Plan};
+use crate::{Algorithm, Backend, Error, Pair, Plan};
 use std::time::Duration;
 
 /// Room for a device. A clone has a device of its own.
@@ -46,36 +46,37 @@ impl DeviceSlot {
         why
     }
 
-    /// Finds all pairs on the device, with the memory of `pairs`, and returns them; and false if the device could not do it.
+    /// Finds all pairs on the device, into `pairs`, with its memory. Returns true if they are in order; none if the device could not
+    /// find them.
     pub(crate) fn find_all(
         &mut self,
         request: &SearchRequest<'_>,
-        mut pairs: Vec<Pair>,
+        pairs: &mut Vec<Pair>,
         report: &mut Report,
-    ) -> (Result<bool, Error>, PairList) {
+    ) -> Result<Option<bool>, Error> {
         stage!("device");
         pairs.clear();
-        let mut found = DeviceFound { pairs: pairs.into(), ..DeviceFound::default() };
+        let Some(device) = &mut self.device else { return Ok(None) };
+        let mut found = DeviceFound { pairs: std::mem::take(pairs).into(), ..DeviceFound::default() };
         let mut clock = Clock::start();
-        let Some(device) = &mut self.device else { return (Ok(false), found.pairs) };
-        let done = match device.find_all(request, &mut found).and_then(|()| check(&mut found, request)) {
+        let done = device.find_all(request, &mut found).and_then(|()| check(&mut found, request));
+        let is_in_order = found.pairs.is_in_order();
+        *pairs = std::mem::take(&mut found.pairs).into_vec();
+        if done.is_err() {
+            pairs.clear();
+        }
+        match done {
             Ok(()) => {
                 self.has_warned = false;
                 found.report.name = self.name().unwrap_or_default().to_owned();
                 add_to(report, &mut found, clock.lap());
-                Ok(true)
+                return Ok(Some(is_in_order));
             }
-            Err(DeviceFailure::TooManyPairs) => Err(Error::TooManyPairs { limit: request.max_pairs }),
-            Err(DeviceFailure::Declined(why)) => {
-                report.fallback = Some(by_cpu(&why));
-                Ok(false)
-            }
-            Err(DeviceFailure::Failed(why)) => {
-                report.fallback = Some(self.fall_back(&why));
-                Ok(false)
-            }
-        };
-        (done, found.pairs)
+            Err(DeviceFailure::TooManyPairs) => return Err(Error::TooManyPairs { limit: request.max_pairs }),
+            Err(DeviceFailure::Declined(why)) => report.fallback = Some(by_cpu(&why)),
+            Err(DeviceFailure::Failed(why)) => report.fallback = Some(self.fall_back(&why)),
+        }
+        Ok(None)
     }
 }
 

@@ -4,10 +4,10 @@
 //! which boxes lie apart most, and has a part for each class. So a leaf looks at few nodes.
 
 use super::hits::{Hits, Rule};
-use crate::bvh::{BoxIndex, LANES, NONE, next};
+use crate::bvh::{BoxIndex, LANES, NONE};
 use crate::parallel::run_with;
 use crate::policy::search::WORK_OF_NODE;
-use crate::simd::{Simd, dispatch};
+use crate::simd::{Simd, dispatch, next};
 use crate::{Aabb, Pair};
 use std::ops::Range;
 

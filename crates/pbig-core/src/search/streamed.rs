@@ -156,7 +156,7 @@ fn chosen(boxes: &[Corners], is_chosen: impl Fn(&Corners) -> bool) -> Vec<Corner
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bvh::tests::needles;
+    use crate::fixtures::needles;
     use crate::oracle;
     use rand::rngs::StdRng;
     use rand::{RngExt, SeedableRng};

@@ -146,8 +146,7 @@ impl Simd for Avx2 {
 
     #[inline(always)]
     fn steps(self, origin: &[f64; 4], scale: &[f64; 4], aabb: &Aabb) -> (Steps, Steps) {
-        // SAFETY: `self` proves the instructions; each load is of an array of four.
-        unsafe {
+        by!({
             let (min, max) = corners(aabb);
             let origin = _mm256_loadu_pd(origin.as_ptr());
             let scale = _mm256_loadu_pd(scale.as_ptr());
@@ -158,13 +157,12 @@ impl Simd for Avx2 {
                 bytemuck::cast(_mm256_cvtpd_epi32(x))
             };
             (steps(min), steps(max))
-        }
+        })
     }
 
     #[inline(always)]
     fn key(self, [x, y, z]: [i32; 3], shift: u32, wraps: bool, point: Steps) -> u32 {
-        // SAFETY: `self` proves the instructions.
-        unsafe {
+        by!({
             let point: __m128i = bytemuck::cast(point);
             let cell = _mm_sra_epi32(point, _mm_cvtsi32_si128(shift as i32));
             let cell = if wraps {
@@ -176,31 +174,29 @@ impl Simd for Avx2 {
             let key = _mm_mullo_epi32(cell, _mm_setr_epi32(1, x, x.wrapping_mul(y), 0));
             let key = _mm_add_epi32(key, _mm_shuffle_epi32::<0b01_00_11_10>(key));
             _mm_cvtsi128_si32(_mm_add_epi32(key, _mm_shuffle_epi32::<0b10_11_00_01>(key))) as u32
-        }
+        })
     }
 
     #[inline(always)]
     fn fits(self, &[x, y, z]: &[f32; 3], aabb: &Aabb) -> bool {
-        // SAFETY: `self` proves the instructions.
-        unsafe {
+        by!({
             let (min, max) = corners(aabb);
             let extent = _mm_sub_ps(max, min);
             let fits = _mm_cmple_ps(extent, _mm_setr_ps(x, y, z, 0.0));
             _mm_movemask_ps(_mm_and_ps(_mm_cmpge_ps(extent, _mm_setzero_ps()), fits)) & 7 == 7
-        }
+        })
     }
 
     #[inline(always)]
     fn code(self, low: Steps, high: Steps) -> u64 {
-        // SAFETY: `self` proves the instructions.
-        unsafe {
+        by!({
             let (low, high): (__m128i, __m128i) = (bytemuck::cast(low), bytemuck::cast(high));
             let (mask, shifts) = (_mm_setr_epi32(511, 511, 511, 0), _mm_setr_epi32(0, 10, 20, 0));
             let field = |steps| _mm_sllv_epi32(_mm_and_si128(steps, mask), shifts);
             let (low, high) = (field(_mm_sub_epi32(_mm_setzero_si128(), low)), field(high));
             let or = _mm_or_si128(_mm_unpacklo_epi32(low, high), _mm_unpackhi_epi32(low, high));
             _mm_cvtsi128_si64(_mm_or_si128(or, _mm_shuffle_epi32::<0b01_00_11_10>(or))) as u64
-        }
+        })
     }
 
     #[inline(always)]

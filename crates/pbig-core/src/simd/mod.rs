@@ -35,6 +35,15 @@ pub(crate) fn eight_from(list: &mut [u32], from: usize) -> &mut Eight {
     list[from..].first_chunk_mut().expect("lists have room for a block more")
 }
 
+/// Takes the lowest bit out of a mask, and returns its number.
+#[inline(always)]
+pub(crate) fn next(mask: &mut u32) -> Option<usize> {
+    let lane = mask.trailing_zeros() as usize;
+    let is_any = *mask != 0;
+    *mask &= mask.wrapping_sub(1);
+    is_any.then_some(lane)
+}
+
 /// Defines primitives of two rows, lane by lane, on a type of rows.
 macro_rules! lanewise {
     ($row:ty: $($name:ident($a:ident, $b:ident) => $body:expr;)*) => {$(

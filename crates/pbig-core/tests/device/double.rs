@@ -1,7 +1,6 @@
 //! A device that tests every pair, and that fails or lies if it is told to.
 
 use pbig_core::{Aabb, DeviceFailure, DeviceFound, Pair, PairDevice, ProxyFilter, SearchRequest, oracle};
-use std::time::Duration;
 
 /// A fault of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,8 +8,6 @@ pub(super) enum Fault {
     Nothing,
     /// Every second call fails.
     Fails,
-    /// It takes its time.
-    IsSlow,
     /// From the third call on it fails after half of the answer.
     IsLost,
     /// Pairs are out of order, which they may be.
@@ -58,7 +55,6 @@ impl Double {
             Fault::Declines if calls.is_multiple_of(2) => {
                 return Err(DeviceFailure::Declined("a crowd".into()));
             }
-            Fault::IsSlow => std::thread::sleep(Duration::from_millis(2)),
             Fault::IsLost if calls > 2 => {
                 let half = found.pairs.len() / 2;
                 found.pairs.truncate(half);

@@ -1,6 +1,7 @@
+use crate::fixtures::{lattice, met, random_point, update};
 use crate::{Aabb, Algorithm, BroadPhase, ProxyFilter};
+use rand::SeedableRng;
 use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 use std::sync::{Barrier, mpsc};
 use std::time::Duration;
 
@@ -8,21 +9,12 @@ use std::time::Duration;
 const BOXES: u32 = 40_000;
 
 fn cube(id: u32, time: f32) -> Aabb {
-    let place = [id % 40, id / 40 % 40, id / 1600].map(|x| 2.0 * x as f32);
-    Aabb::from_center([place[0] + time, place[1], place[2]], [0.5; 3])
+    let [x, y, z] = lattice(id, 40).map(|x| 2.0 * x);
+    Aabb::from_center([x + time, y, z], [0.5; 3])
 }
 
 fn step(broad_phase: &mut BroadPhase, time: f32, step: usize) {
-    for id in (0..BOXES).step_by(step) {
-        broad_phase.set(id, cube(id, time), ProxyFilter::ALL).expect("an id below the limit");
-    }
-    broad_phase.update().expect("no pairs");
-}
-
-fn met(broad_phase: &BroadPhase, aabb: &Aabb) -> Vec<u32> {
-    let mut met = broad_phase.overlapping(aabb);
-    met.sort_unstable();
-    met
+    update(broad_phase, (0..BOXES).step_by(step).map(|id| (id, cube(id, time))));
 }
 
 /// Asks on a thread outside the pool and on all of the pool at once.
@@ -38,46 +30,41 @@ fn ask_together(ask: &(impl Fn() + Sync)) {
     });
 }
 
-/// A thread that refits the tree must not wait for one of the pool, because all of these may wait for the refit.
-#[test]
-fn a_thread_refits_the_tree_although_all_of_the_pool_wait_for_it() {
+/// Asserts that work comes to an end.
+fn ends(work: impl FnOnce() + Send + 'static) {
     let (sender, receiver) = mpsc::channel();
     std::thread::spawn(move || {
-        let mut broad_phase = BroadPhase::default();
-        for time in 0..100 {
-            step(&mut broad_phase, time as f32, 1);
-            // A change after the update makes the tree stale.
-            broad_phase.set_aabb(0, cube(0, time as f32 + 0.1));
-            let ask = || {
-                assert_eq!(met(&broad_phase, &cube(7, time as f32)), [7]);
-            };
-            ask_together(&ask);
-        }
+        work();
         sender.send(()).expect("the test waits");
     });
     receiver.recv_timeout(Duration::from_secs(300)).expect("no thread waits for ever");
 }
 
+/// A thread that refits the tree must not wait for one of the pool, because all of these may wait for the refit.
+#[test]
+fn a_thread_refits_the_tree_although_all_of_the_pool_wait_for_it() {
+    ends(|| {
+        let mut broad_phase = BroadPhase::default();
+        for time in 0..100 {
+            step(&mut broad_phase, time as f32, 1);
+            // A change after the update makes the tree stale.
+            broad_phase.set_aabb(0, cube(0, time as f32 + 0.1));
+            ask_together(&|| assert_eq!(met(&broad_phase, &cube(7, time as f32)), [7]));
+        }
+    });
+}
+
 /// The first question for the pairs of a box after a search makes backward rows, by the same rule.
 #[test]
 fn a_thread_makes_backward_rows_although_all_of_the_pool_wait_for_them() {
-    let (sender, receiver) = mpsc::channel();
-    std::thread::spawn(move || {
+    ends(|| {
         let mut broad_phase = BroadPhase::default();
         for time in 0..40 {
-            for id in 0..BOXES {
-                let aabb = cube(id, 0.1 * time as f32).inflated(0.51);
-                broad_phase.set(id, aabb, ProxyFilter::ALL).expect("an id below the limit");
-            }
-            broad_phase.update().expect("few pairs");
-            let ask = || {
-                assert!(broad_phase.pairs_of(777).count() > 3);
-            };
-            ask_together(&ask);
+            let boxes = (0..BOXES).map(|id| (id, cube(id, 0.1 * time as f32).inflated(0.51)));
+            update(&mut broad_phase, boxes);
+            ask_together(&|| assert!(broad_phase.pairs_of(777).count() > 3));
         }
-        sender.send(()).expect("the test waits");
     });
-    receiver.recv_timeout(Duration::from_secs(300)).expect("no thread waits for ever");
 }
 
 #[test]
@@ -100,7 +87,7 @@ fn jumps_and_returns_among_many_sizes_are_known_exactly() {
     let n = 18_000u32;
     let mut random = StdRng::seed_from_u64(8);
     let mut any = |id: u32| {
-        let at = [0; 3].map(|_| random.random_range(0.0f32..60.0));
+        let at = random_point(&mut random, 0.0..60.0);
         let size = [0.3, 0.5, 6.0, 0.5, 0.02][id as usize % 5];
         let flat = if id.is_multiple_of(7) { 0.01 } else { 1.0 };
         Aabb::from_center(at, [size, size * flat, size])

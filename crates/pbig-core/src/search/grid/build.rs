@@ -139,8 +139,8 @@ impl Grid {
         let ends = split_into(&mut self.starts[1..], (0..split.buckets).map(|bucket| keys(bucket).len()));
         run_parts(workers, records.zip(ends), |bucket, ((records, codes), ends)| {
             let (slots, first_key) = (slots(bucket), keys(bucket).start);
-            let sorted = SortedBucket { first_key, first_slot: slots.start, ends, records, codes };
-            dispatch!(sort_bucket, cells, &coarse[slots.clone()], sorted);
+            let (bucket, ends) = ((&coarse[slots.clone()], slots.start), (&mut *ends, first_key));
+            dispatch!(sort_bucket, cells, bucket, ends, (&mut *records, &mut *codes));
         });
         self.starts[0] = 0;
         self.starts[count + 1..count + 4].fill(self.len as u32);
@@ -217,19 +217,15 @@ fn scatter_records(
     }
 }
 
-struct SortedBucket<'a> {
-    first_key: usize,
-    first_slot: usize,
-    /// By cell: where it ends.
-    ends: &'a mut [u32],
-    records: &'a mut [Record],
-    codes: &'a mut [u64],
-}
-
-/// Sorts a bucket by cell, and computes its codes.
+/// Sorts a bucket by cell, and computes its codes. It comes with its first slot, and the ends of its cells with the key of the first one.
 #[inline(always)]
-fn sort_bucket(simd: impl Simd, cells: Cells, bucket: &[Record], sorted: SortedBucket<'_>) {
-    let SortedBucket { first_key, first_slot, ends, records, codes } = sorted;
+fn sort_bucket(
+    simd: impl Simd,
+    cells: Cells,
+    (bucket, first_slot): (&[Record], usize),
+    (ends, first_key): (&mut [u32], usize),
+    (records, codes): (&mut [Record], &mut [u64]),
+) {
     ends.fill(0);
     for record in bucket {
         ends[record.key as usize - first_key] += 1;

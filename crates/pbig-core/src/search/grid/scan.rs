@@ -3,13 +3,11 @@
 
 use super::Grid;
 use super::cells::{Cells, Window};
-use crate::Aabb;
-use crate::NeighbourScan;
 use crate::parallel::run_with;
 use crate::policy::search::{WORK_OF_ROW, WORK_OF_RUNS};
 use crate::search::hits::{CHARGED_FROM, HIT_ROOM, HitWriter, Hits, Record, Rule};
-use crate::simd::{BLOCK, Simd, dispatch};
-use crate::simd::{Portable, query_of};
+use crate::simd::{BLOCK, Portable, Simd, dispatch, query_of};
+use crate::{Aabb, NeighbourScan};
 use std::ops::Range;
 
 /// Number of boxes in a piece of work. It does not follow the threads, because the work of a piece is charged to the budget.

@@ -2,8 +2,7 @@
 
 use super::cells::Cells;
 use crate::Aabb;
-use crate::simd::query_of;
-use crate::simd::{BLOCK, EightBoxes, Portable, Simd, dispatch};
+use crate::simd::{BLOCK, EightBoxes, Portable, Simd, dispatch, query_of};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
