@@ -6,6 +6,7 @@
 //! ```
 
 mod look_up;
+mod part;
 mod query;
 mod search;
 #[cfg(feature = "serde")]

@@ -1,8 +1,10 @@
 //! The index gives the answers of a scan of all boxes, after all kinds of changes, and looks at few boxes.
 
+mod instructions;
+mod room;
+
 use super::{BoxIndex, LANES, NONE};
 use crate::fixtures::{cube, random_point};
-use crate::simd::{Portable, Simd};
 use crate::{Aabb, Config, Engine, Finder};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -296,57 +298,6 @@ fn an_index_forgets_a_peak() {
     }
 }
 
-/// Wherever boxes come, the lanes of those that went are enough for them.
-#[test]
-fn boxes_that_come_find_the_room_of_those_that_went() {
-    let (n, mut rng) = (20_000, StdRng::seed_from_u64(2));
-    let (mut boxes, elsewhere, mut index) = (scattered(n), scattered(n), BoxIndex::default());
-    let present = 0..n as u32;
-    index.refresh_present(&boxes, None, present.clone(), true);
-    for round in 0..40 {
-        let changed: Vec<u32> = (0..n as u32).filter(|id| (id * 7 + round) % 40 < 2).collect();
-        for id in &changed {
-            let is_there = (id * 7 + round) % 40 == 1;
-            boxes[*id as usize] = if is_there { elsewhere[rng.random_range(0..n)] } else { Aabb::NOWHERE };
-        }
-        index.refresh_present(&boxes, Some(&changed), present.clone(), true);
-        check_form(&index, &boxes);
-        assert!(index.loose().len() < 12, "round {round}: {} leaves outside the tree", index.loose().len());
-    }
-}
-
-/// A leaf that has become empty takes the next boxes there, and so do all leaves of a node.
-#[test]
-fn boxes_that_go_and_come_back_find_their_empty_leaves() {
-    let boxes = scattered(3000);
-    for together in [1, LANES] {
-        let (mut index, mut some) = (BoxIndex::default(), boxes.clone());
-        index.refresh(&boxes, None);
-        for first in (0..index.leaves as usize / 3).step_by(LANES) {
-            let leaves = &index.nodes[first..first + together];
-            let ids: Vec<u32> =
-                leaves.iter().flat_map(|leaf| leaf.children).filter(|id| *id != NONE).collect();
-            ids.iter().for_each(|id| some[*id as usize] = Aabb::NOWHERE);
-            index.refresh(&some, Some(&ids));
-            ids.iter().for_each(|id| some[*id as usize] = boxes[*id as usize]);
-            index.refresh(&some, Some(&ids));
-            check_form(&index, &some);
-        }
-        assert!(index.loose().is_empty(), "{} leaves outside the tree", index.loose().len());
-    }
-}
-
-/// Many boxes came, and the tree is laid out anew: the next ones find room.
-#[test]
-fn a_layout_for_look_ups_leaves_room() {
-    let (mut index, mut boxes) = (BoxIndex::default(), scattered(2000));
-    index.refresh_present(&boxes, None, 0..2000, true);
-    boxes.extend(scattered(6000));
-    index.refresh_present(&boxes, None, 0..8000, true);
-    let full = index.room[..index.leaves as usize].iter().filter(|room| **room == 0).count();
-    assert!(full < 10, "{full} of {} leaves are full", index.leaves);
-}
-
 /// Boxes that come after a sort make queries slow only until these have paid for the next one.
 #[test]
 fn later_boxes_are_sorted_in_once_queries_have_paid() {
@@ -437,37 +388,5 @@ fn ids_beyond_a_shorter_list_are_not_visited() {
         let stale = if len > before { before as u32..len as u32 - 1 } else { 0..0 };
         let wanted: Vec<u32> = (0..len as u32).filter(|id| !stale.contains(id)).collect();
         assert_eq!(overlapping(&index, &unit), wanted, "{len}");
-    }
-}
-
-/// Gathers eight boxes, and returns them and the box around them.
-fn gathered(simd: impl Simd, boxes: &[Aabb], at: &[u32; 8]) -> ([[f32; 8]; 6], Aabb) {
-    let eight = simd.gather(boxes, at);
-    (eight, simd.around(&eight))
-}
-
-/// Returns the lane of the nearest key, and keys with their values, the farthest first.
-fn ordered(
-    simd: impl Simd,
-    keys: &[f32; 8],
-    limits: &[f32; 8],
-    values: &[u32; 8],
-) -> (Option<usize>, Vec<f32>, Vec<u32>) {
-    let (sorted, order, count) = simd.farthest_first(keys, limits, values);
-    (simd.nearest(keys, limits), sorted[..count].to_vec(), order[..count].to_vec())
-}
-
-#[test]
-fn instructions_gather_and_order_as_the_portable_ones_do() {
-    let mut rng = StdRng::seed_from_u64(11);
-    for _ in 0..2000 {
-        let boxes: Vec<Aabb> = (0..20).map(|_| random_box(&mut rng, 5.0)).collect();
-        let at = [0; 8].map(|_| rng.random_range(0..22u32).checked_sub(1).unwrap_or(u32::MAX));
-        assert_eq!(crate::simd::dispatch!(gathered, &boxes, &at), gathered(Portable, &boxes, &at));
-        let number =
-            |rng: &mut StdRng| [0.0, 1.0, f32::MAX, f32::INFINITY, rng.random()][rng.random_range(0..5)];
-        let [keys, limits] = [(); 2].map(|()| [0; 8].map(|_| number(&mut rng)));
-        let ours = crate::simd::dispatch!(ordered, &keys, &limits, &at);
-        assert_eq!(ours, ordered(Portable, &keys, &limits, &at), "{keys:?} {limits:?}");
     }
 }
