@@ -14,10 +14,10 @@ pub(crate) const GROWN_SHARE: usize = 8;
 /// eighth to the work.
 pub(crate) const SORTS_FOR_ORDER: u64 = 8;
 
-/// Returns the number of nodes that queries look at before a sort: it then takes about as long as they did. A sort looks at
-/// all ids, too.
-pub(crate) fn nodes_for_sort(leaves: u32, ids: usize) -> u64 {
-    64 + 256 * u64::from(leaves) + ids as u64 / 4
+/// Returns the number of nodes that queries look at before a sort: it then takes about as long as they did. A sort reads
+/// all boxes, too.
+pub(crate) fn nodes_for_sort(leaves: u32, boxes: usize) -> u64 {
+    64 + 256 * u64::from(leaves) + boxes as u64 / 4
 }
 
 /// Minimum share of leaves with a box, as one in this number, for a layout to stay when all boxes are read.

@@ -1,5 +1,5 @@
 //! The choice of how an update is made: changed boxes are looked up, or all boxes are searched. Budgets choose among searches, see
-//! `search.rs` and `search/all_pairs.rs`.
+//! `policy/search.rs` and `search/all_pairs.rs`.
 
 /// Maximum share of changed boxes for look-ups, as one in this number, up to some numbers of boxes and beyond. Measured: with more,
 /// look-ups take longer than a search of dense boxes.

@@ -2,7 +2,7 @@
 //! the same boxes and the same calls take the same path on every machine.
 //!
 //! Constants of plans and threads are here. `engine` chooses how an update is made, `backend` where a call runs. `search` has the
-//! budgets of a search, and `bvh` the upkeep of the tree. A constant that one file alone uses stands in that file.
+//! budgets of a search, and `bvh` the upkeep of the tree. A constant that decides nothing stands in the file that uses it.
 
 mod backend;
 pub(crate) mod bvh;
@@ -33,7 +33,7 @@ pub(crate) const MAX_CELLS_PER_BOX: f64 = 8.0;
 /// Number of cells that a grid may have for any number of boxes.
 pub(crate) const MIN_CELLS: f64 = 4096.0;
 
-/// Maximum mean number of boxes in a cell for a search to visit the five runs of the half neighbourhood unseen.
+/// Maximum mean number of boxes in a cell for a search to visit all of the five runs of the half neighbourhood.
 pub(crate) const RUNS_UP_TO_PER_CELL: f64 = 3.0;
 
 /// Maximum mean number of boxes of both sets in a cell of 64 steps, for their cells to have 128, if the sample sees
