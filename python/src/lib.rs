@@ -8,27 +8,36 @@ mod search;
 use arrays::{BoxArray, Table, table};
 use mesh::{KindPair, Mesh};
 use numpy::PyReadonlyArray2;
-use pbig_core::{Finder, find_pairs};
+use pbig_core::Finder;
 use pyo3::prelude::*;
-use search::search;
+use search::{search, search_mesh};
 
-/// Returns the pairs of overlapping boxes.
+/// Returns the pairs of overlapping boxes, and the number of invalid boxes.
 #[pyfunction]
-fn pairs<'py>(py: Python<'py>, boxes: BoxArray<'py>) -> PyResult<Table<'py>> {
+fn pairs<'py>(py: Python<'py>, boxes: BoxArray<'py>) -> PyResult<(Table<'py>, u64)> {
     let numbers = boxes.numbers()?;
-    Ok(table(py, search(py, || find_pairs(&numbers.boxes()))?))
+    let find = || {
+        let mut finder = Finder::default();
+        finder.find(&numbers.boxes())?;
+        let invalid = finder.report().invalid;
+        Ok((finder.into_pairs(), invalid))
+    };
+    let (pairs, invalid) = search(py, find)?;
+    Ok((table(py, pairs), invalid))
 }
 
-/// Returns the pairs of a box of one set and a box of another.
+/// Returns the pairs of a box of one set and a box of another, and the number of invalid boxes.
 #[pyfunction]
-fn pairs_between<'py>(py: Python<'py>, a: BoxArray<'py>, b: BoxArray<'py>) -> PyResult<Table<'py>> {
+fn pairs_between<'py>(py: Python<'py>, a: BoxArray<'py>, b: BoxArray<'py>) -> PyResult<(Table<'py>, u64)> {
     let (a, b) = (a.numbers()?, b.numbers()?);
     let find = || {
         let mut finder = Finder::default();
         finder.find_between(&a.boxes(), &b.boxes())?;
-        Ok(finder.into_pairs_between())
+        let invalid = finder.report().invalid;
+        Ok((finder.into_pairs_between(), invalid))
     };
-    Ok(table(py, search(py, find)?))
+    let (pairs, invalid) = search(py, find)?;
+    Ok((table(py, pairs), invalid))
 }
 
 /// Returns a table of pairs for each two kinds of elements. The frames are the vertices at the beginning and the end of a step.
@@ -37,12 +46,14 @@ fn mesh_pairs<'py>(
     py: Python<'py>,
     frames: [PyReadonlyArray2<'py, f64>; 2],
     faces: PyReadonlyArray2<'py, u32>,
+    edges: Option<PyReadonlyArray2<'py, u32>>,
     margin: f64,
     kinds: Vec<KindPair>,
 ) -> PyResult<Vec<Table<'py>>> {
     let frames = [frames[0].as_slice()?, frames[1].as_slice()?].map(bytemuck::cast_slice);
     let faces = bytemuck::cast_slice(faces.as_slice()?);
-    let found = search(py, || Mesh::new(frames, faces, margin).find(&kinds))?;
+    let edges = edges.as_ref().map(PyReadonlyArray2::as_slice).transpose()?.map(bytemuck::cast_slice);
+    let found = search_mesh(py, || Mesh::new(frames, faces, edges, margin).find(&kinds))?;
     Ok(found.into_iter().map(|pairs| table(py, pairs)).collect())
 }
 

@@ -2,6 +2,7 @@
 
 use pbig_core::{Aabb, Boxes, Error, Finder, Keys, NO_KEY};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Two kinds of elements: `v` for vertices, `e` for edges or `f` for faces.
 pub(crate) type KindPair = [char; 2];
@@ -63,21 +64,28 @@ fn sides(faces: &[Keys]) -> impl Iterator<Item = [u32; 2]> {
 pub(crate) struct Mesh<'a> {
     vertices: Vec<Aabb>,
     faces: &'a [Keys],
+    /// Those of the faces if there are none.
+    edges: Option<&'a [[u32; 2]]>,
 }
 
 impl<'a> Mesh<'a> {
-    pub(crate) fn new([from, to]: [&[[f64; 3]]; 2], faces: &'a [Keys], margin: f64) -> Self {
+    pub(crate) fn new(
+        [from, to]: [&[[f64; 3]]; 2],
+        faces: &'a [Keys],
+        edges: Option<&'a [[u32; 2]]>,
+        margin: f64,
+    ) -> Self {
         let vertices = from
             .par_iter()
             .zip(to)
             .with_min_len(BOXES_OF_THREAD)
             .map(|(from, to)| swept(from, to, margin))
             .collect();
-        Self { vertices, faces }
+        Self { vertices, faces, edges }
     }
 
     /// Returns a list of pairs for each two kinds.
-    pub(crate) fn find(&self, all: &[KindPair]) -> Result<Vec<Pairs>, Error> {
+    pub(crate) fn find(&self, all: &[KindPair]) -> Result<Vec<Pairs>, (KindPair, Error)> {
         let is_wanted = |kind| all.iter().any(|kinds| kinds.contains(&kind));
         let wanted = |kind| if is_wanted(kind) { self.elements(kind) } else { Elements::default() };
         let [v, e, f] = ['v', 'e', 'f'].map(wanted);
@@ -86,13 +94,17 @@ impl<'a> Mesh<'a> {
             'e' => &e,
             _ => &f,
         };
-        all.iter().map(|[a, b]| if a == b { of(*a).pairs() } else { of(*a).pairs_with(of(*b)) }).collect()
+        let find = |[a, b]: KindPair| if a == b { of(a).pairs() } else { of(a).pairs_with(of(b)) };
+        all.iter().map(|kinds| find(*kinds).map_err(|error| (*kinds, error))).collect()
     }
 
     fn elements(&self, kind: char) -> Elements {
         let keys: Vec<Keys> = match kind {
             'v' => (0..self.vertices.len() as u32).map(|v| [v, NO_KEY, NO_KEY, NO_KEY]).collect(),
-            'e' => edges(self.faces).into_iter().map(|[v, w]| [v, w, NO_KEY, NO_KEY]).collect(),
+            'e' => {
+                let edges = self.edges.map_or_else(|| edges(self.faces).into(), Cow::Borrowed);
+                edges.iter().map(|[v, w]| [*v, *w, NO_KEY, NO_KEY]).collect()
+            }
             _ => self.faces.to_vec(),
         };
         let corners = keys.par_iter().with_min_len(BOXES_OF_THREAD);

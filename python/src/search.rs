@@ -1,5 +1,6 @@
 //! Searches without the lock of Python's interpreter, in processes that may have been forked.
 
+use crate::mesh::KindPair;
 use pbig_core::Error;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -18,6 +19,19 @@ pub(crate) fn note_process() {
 /// Runs a search while other Python threads go on.
 pub(crate) fn search<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Error> + Send) -> PyResult<T> {
     py.detach(|| with_threads(work)).map_err(to_python)
+}
+
+/// As [`search`], of a mesh.
+pub(crate) fn search_mesh<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<T, (KindPair, Error)> + Send,
+) -> PyResult<T> {
+    py.detach(|| with_threads(work)).map_err(|([a, b], error)| match error {
+        Error::TooManyPairs { limit } => PyValueError::new_err(format!(
+            "{a}{b}: more than {limit} candidate pairs; give a smaller margin or step, or one entry of elements a call"
+        )),
+        other => to_python(other),
+    })
 }
 
 /// Runs work where rayon has threads.

@@ -43,6 +43,8 @@ ERRORS = [
     (mesh(faces=[[0.0, 1, 2]]), TypeError, "faces has values of the type float64; give whole numbers"),
     (mesh(faces=[[True, False, True]]), TypeError, "faces has values of the type bool; give whole numbers"),
     (mesh(faces=[[0, 1]]), ValueError, "faces has the shape (1, 2); give (n, 3) or (n, 4): these are edges"),
+    (mesh(edges=[[0, 1, 2]]), ValueError, "edges has the shape (1, 3); give (k, 2), with the two vertices of an edge"),
+    (mesh(edges=[[0, 8]]), ValueError, "edges[0, 1] is 8; the index of a vertex must be at least 0 and below 8"),
     (mesh(margin=-0.5), ValueError, "margin is -0.5; give a finite length of at least 0"),
     (mesh(margin=np.inf), ValueError, "margin is inf; give a finite length of at least 0"),
     (mesh(margin=np.float32("nan")), ValueError, "margin is nan; give a finite length of at least 0"),
@@ -92,6 +94,13 @@ def test_a_warning_says_what_and_where_and_points_at_the_caller(changes, words):
         mesh(**changes)()
     assert [str(warning.message).startswith(words) for warning in caught] == [True]
     assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize("call", [pbig.pairs, lambda boxes: pbig.pairs_between(BOXES, boxes)])
+def test_boxes_that_pair_with_nothing_are_told(call):
+    with pytest.warns(UserWarning, match="has 2 rows with a NaN or a minimum above its maximum, the first is row 1: ") as caught:
+        call(np.array([[0, 0, 0, 1, 1, 1], [0, 0, 0, 1, np.nan, 1], [0, 9, 0, 1, 1, 1]]))
+    assert len(caught) == 1 and caught[0].filename == __file__
 
 
 def test_sound_and_empty_meshes_are_silent(recwarn):

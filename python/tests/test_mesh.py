@@ -49,6 +49,18 @@ def test_candidates_are_those_of_a_test_of_all(mesh, moves, margin):
         assert pairs.tolist() == brute.mesh_pairs(kinds, frames, faces.tolist(), margin), kinds
 
 
+def test_edges_of_ones_own_are_numbered_as_given():
+    vertices, faces = MESHES["cloth"]
+    usual = pbig.edges(faces)
+    found = pbig.mesh_pairs(vertices, faces, elements="ee,ev")
+    turned = pbig.mesh_pairs(vertices, faces, elements="ee,ev", edges=usual[::-1, ::-1])
+    last = len(usual) - 1
+    assert turned["ee"].tolist() == sorted([last - j, last - i] for i, j in found["ee"].tolist())
+    assert turned["ev"].tolist() == sorted([last - i, v] for i, v in found["ev"].tolist())
+    rods = pbig.mesh_pairs([[0.0, 0, 0], [2, 2, 0], [2, 0, 0], [0, 2, 0]], [], edges=[[0, 1], [2, 3]], elements="ee")
+    assert rods["ee"].tolist() == [[0, 1]]
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_margin_below_the_last_bit_grows_boxes(sign):
     places = np.array([1, np.nextafter(np.float32(1), np.float32(2))], float) * sign

@@ -4,7 +4,7 @@ use crate::options::{check_inputs, check_output, plan_text, print_summary, with_
 use crate::pairs::{Args, adapter, repeated};
 use pbig_core::{Finder, Report};
 use pbig_harness::files::{BOXES_OR_PAIRS, Location, counted, ending, name, write_csv, write_id_pairs};
-use pbig_harness::mesh::{Elements, Mesh, MeshElements};
+use pbig_harness::mesh::{Elements, Mesh, MeshElements, NO_ELEMENTS};
 use pbig_harness::output::warn;
 use pbig_harness::prelude::*;
 use std::path::{Path, PathBuf};
@@ -96,11 +96,12 @@ fn refuse_invalid((path, mesh): &Frame<'_>) -> Result<(), Failure> {
 
 /// Returns what the files have that a reader may not expect, a line each.
 fn notes(frames: &[Frame<'_>]) -> Vec<String> {
-    let of_file = |(path, mesh): &Frame<'_>| {
-        let line = |note| format!("{}: {note}", name(path));
-        mesh.notes().into_iter().map(line).collect::<Vec<_>>()
+    let of_file = |(i, (path, mesh)): (usize, &Frame<'_>)| {
+        // A later frame may be vertices alone.
+        let notes = mesh.notes().into_iter().filter(move |note| i == 0 || note != NO_ELEMENTS);
+        notes.map(|note| format!("{}: {note}", name(path))).collect::<Vec<_>>()
     };
-    frames.iter().flat_map(of_file).collect()
+    frames.iter().enumerate().flat_map(of_file).collect()
 }
 
 /// Checks inputs and outputs before the work, and returns the files for pairs: one, or one for each kind if a `.npy` is wanted,

@@ -29,7 +29,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FRAME", requires = "mesh")]
     pub(crate) next: Option<PathBuf>,
     /// Pairs of elements: ee, vf or any two of v (vertex), e (edge) and f (face), with commas.
-    #[arg(long, value_name = "KINDS", value_parser = kinds, value_delimiter = ',', requires = "mesh")]
+    // With INPUT a mesh is not required: it would conflict.
+    #[arg(long, value_name = "KINDS", value_parser = kinds, value_delimiter = ',', requires = "mesh", conflicts_with = "input")]
     pub(crate) elements: Vec<Kinds>,
     /// File for the vertices of each edge: .npy (E,2) uint32 or .csv; row `i` has those of the edge `i`.
     #[arg(long, value_name = "TABLE", requires = "mesh")]

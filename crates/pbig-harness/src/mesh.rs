@@ -8,6 +8,7 @@ mod tests_of_files;
 
 use crate::files::{Location, counted, grown};
 use pbig_core::{Aabb, Boxes, Keys, NO_KEY};
+pub use reading::NO_ELEMENTS;
 use reading::Oddity;
 use std::collections::BTreeMap;
 

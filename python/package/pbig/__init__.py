@@ -23,9 +23,10 @@ Pairs = NDArray[np.uint32]
 def pairs(boxes: ArrayLike) -> Pairs:
     """Returns every pair of overlapping boxes.
 
-    Boxes are closed: two that touch overlap. A box with a NaN, or a minimum above its maximum, pairs with nothing.
-    Extents may be infinite. For a margin r give `boxes + [-r, -r, -r, r, r, r]`. Boxes in float64 are rounded outward to float32, so no pair is missed. A float32 array in C
-    order is read in place: no other thread may write to it meanwhile.
+    Boxes are closed: two that touch overlap. A box with a NaN, or a minimum above its maximum, pairs with nothing, and a
+    UserWarning tells of it. Extents may be infinite. For a margin r give `boxes + [-r, -r, -r, r, r, r]`. Boxes in
+    float64 are rounded outward to float32, so no pair is missed. A float32 array in C order is read in place: no other
+    thread may write to it meanwhile.
 
     Args:
         boxes: float32 or float64, shape (n, 6), min xyz and max xyz in a row, or (n, 2, 3). At most 2**27.
@@ -41,7 +42,11 @@ def pairs(boxes: ArrayLike) -> Pairs:
     >>> pbig.pairs(boxes).tolist()
     [[0, 1]]
     """
-    return _pbig.pairs(_checks.boxes("boxes", boxes))
+    rows = _checks.boxes("boxes", boxes)
+    found, invalid = _pbig.pairs(rows)
+    if invalid > 0:
+        _checks.warn_of_invalid("boxes", rows)
+    return found
 
 
 def pairs_between(a: ArrayLike, b: ArrayLike) -> Pairs:
@@ -63,7 +68,12 @@ def pairs_between(a: ArrayLike, b: ArrayLike) -> Pairs:
     >>> pbig.pairs_between(a, a[::-1] + 0.5).tolist()
     [[0, 1], [1, 0]]
     """
-    return _pbig.pairs_between(_checks.boxes("a", a), _checks.boxes("b", b))
+    rows, others = _checks.boxes("a", a), _checks.boxes("b", b)
+    found, invalid = _pbig.pairs_between(rows, others)
+    if invalid > 0:
+        _checks.warn_of_invalid("a", rows)
+        _checks.warn_of_invalid("b", others)
+    return found
 
 
 def mesh_pairs(
@@ -72,6 +82,7 @@ def mesh_pairs(
     after: Optional[ArrayLike] = None,
     margin: float = 0.0,
     elements: str = "ee,vf",
+    edges: Optional[ArrayLike] = None,
 ) -> dict[str, Pairs]:
     """Returns candidate pairs of elements of a mesh: elements that share no vertex, and whose boxes overlap.
 
@@ -84,10 +95,12 @@ def mesh_pairs(
         after: The vertices at the end of a step. A box then holds its element on the straight way there.
         margin: Length by which each box grows on all sides, rounded outward: half a thickness.
         elements: Entries of two kinds, v (vertex), e (edge) or f (face), with commas between them.
+        edges: Whole numbers, shape (k, 2): two vertices in a row, in place of `pbig.edges(faces)`: in an order of your
+            own, or with rods, edges without a face.
 
     Returns:
         For each entry uint32, shape (k, 2), sorted: the first kind in the first column. For two of one kind each row
-        is i < j. An edge is a row of `edges(faces)`.
+        is i < j. An edge is a row of `edges`, or of `pbig.edges(faces)`.
 
     Raises:
         TypeError: Values or an argument have a wrong type.
@@ -102,9 +115,10 @@ def mesh_pairs(
     kinds = _checks.kinds(elements)
     before = _checks.vertices("vertices", vertices)
     rows = _checks.faces(faces, len(before))
+    own = None if edges is None else _checks.edges(edges, len(before))
     later = before if after is None else _checks.vertices("after", after)
     _checks.same_count(before, later)
-    found = _pbig.mesh_pairs((before, later), rows, _checks.margin(margin), [tuple(kind) for kind in kinds])
+    found = _pbig.mesh_pairs((before, later), rows, own, _checks.margin(margin), [tuple(kind) for kind in kinds])
     return dict(zip(kinds, found))
 
 

@@ -54,7 +54,7 @@ def faces(values: ArrayLike, vertex_count: int) -> NDArray[np.uint32]:
     """Returns faces as rows of four vertices. A triangle has `NO_VERTEX` last. Warns of faces that name a vertex twice."""
     array = _array("faces", values, 3)
     if array.shape[1:] == (2,):
-        raise _wrong_shape("faces", array, "(n, 3) or (n, 4): these are edges, which pbig takes from faces")
+        raise _wrong_shape("faces", array, "(n, 3) or (n, 4): these are edges, which are given as edges=")
     if array.shape[1:] not in ((3,), (4,)):
         raise _wrong_shape("faces", array, "(n, 3) for triangles, or (n, 4) for quadrilaterals")
     rows = np.full((len(array), 4), NO_VERTEX, np.uint32)
@@ -63,6 +63,21 @@ def faces(values: ArrayLike, vertex_count: int) -> NDArray[np.uint32]:
     are_doubled = [corners[i] == corners[j] for i in range(len(corners)) for j in range(i)]
     _warn("faces", np.logical_or.reduce(are_doubled), "that name a vertex twice", "they stay, with fewer edges")
     return rows
+
+
+def edges(values: ArrayLike, vertex_count: int) -> NDArray[np.uint32]:
+    """Returns edges as rows of two vertices."""
+    array = _array("edges", values, 2)
+    if array.shape[1:] != (2,):
+        raise _wrong_shape("edges", array, "(k, 2), with the two vertices of an edge in a row")
+    _check_rows("edges", array)
+    return np.require(_indices("edges", array, "the index of a vertex", vertex_count), np.uint32, ["C", "A"])
+
+
+def warn_of_invalid(name: str, rows: NDArray[Any]) -> None:
+    """Warns of boxes that pair with nothing."""
+    are_valid = (rows[:, :3] <= rows[:, 3:]).all(axis=1)
+    _warn(name, ~are_valid, "with a NaN or a minimum above its maximum", "they pair with nothing; a row is min xyz, max xyz")
 
 
 def ids(values: ArrayLike) -> NDArray[np.uint32]:

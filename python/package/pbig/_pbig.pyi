@@ -1,7 +1,7 @@
 """The compiled module. Arrays are in C order, and checked before."""
 
 from collections.abc import Sequence
-from typing import Union
+from typing import Optional, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,12 @@ __version__: str
 _Boxes = Union[NDArray[np.float32], NDArray[np.float64]]
 _Table = NDArray[np.uint32]
 
-def pairs(boxes: _Boxes) -> _Table: ...
-def pairs_between(a: _Boxes, b: _Boxes) -> _Table: ...
+def pairs(boxes: _Boxes) -> tuple[_Table, int]: ...
+def pairs_between(a: _Boxes, b: _Boxes) -> tuple[_Table, int]: ...
 def mesh_pairs(
     frames: tuple[NDArray[np.float64], NDArray[np.float64]],
     faces: NDArray[np.uint32],
+    edges: Optional[NDArray[np.uint32]],
     margin: float,
     kinds: Sequence[tuple[str, ...]],
 ) -> list[_Table]: ...

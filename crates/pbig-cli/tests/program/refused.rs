@@ -170,7 +170,10 @@ fn other_separators_or_headers_are_told_what_is_expected() {
         ),
         ("0,5;0,5;0,5;1;1;1\n", "line 1: values are separated by semicolons; expected commas"),
         ("0,0,0,1,1,1\n0\t0\t0\t1\t1\t1\n", "line 2: values are separated by tabs; expected commas"),
-        ("0 0 0 1 1 1\n", "line 1: expected 6 columns, separated by commas, found 1"),
+        (
+            "0 0 0 1 1 1\n",
+            "line 1: values are separated by spaces; expected commas: numpy.savetxt takes delimiter=','",
+        ),
         ("max_x,max_y,max_z,min_x,min_y,min_z\n1,1,1,0,0,0\n", &format!("line 1: {header}")),
         ("\u{feff}id,min_x,min_y,min_z,max_x,max_y,max_z\n", &format!("line 1: {header}")),
         ("hello world\n", &format!("line 1: {header}")),

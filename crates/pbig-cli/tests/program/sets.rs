@@ -105,6 +105,10 @@ fn a_mesh_tells_what_it_lacks_and_which_elements_are_invalid() {
     assert_eq!(warnings, "pbig: warning: point.obj: the mesh has no faces, and vf no pairs\n");
     let object = json(&pbig(here, &["pairs", "--mesh", "point.obj", "--elements", "vv", "--json"]));
     assert_eq!(object["notes"], serde_json::json!(["point.obj: no faces and no rods"]));
+    write(here, "flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write(here, "later.obj", "v 0 0 1\nv 1 0 1\nv 0 1 1\n");
+    let later = ["pairs", "--mesh", "flat.obj", "--next", "later.obj", "--elements", "ee", "--json"];
+    assert_eq!(json(&pbig(here, &later))["notes"], serde_json::json!([]), "vertices are enough");
     let faces = "f 1 2 3\nf 2 3 4\nf 1 2 4\nf 1 3 4\n";
     write(here, "nan.obj", &format!("v 0 0 0\nv nan 0 0\nv 0 nan 0\nv 0 0 1\n{faces}"));
     let [summary, warnings] = run("nan.obj", "vf,vv,ff");

@@ -53,6 +53,10 @@ fn every_error_names_the_help_and_guesses_nothing() {
         ),
         (&["pears"], "unrecognized subcommand 'pears' (see pbig --help)"),
         (&["--jsn", "pairs"], "unexpected argument '--jsn' found (see pbig --help)"),
+        (
+            &["pairs", "x.npy", "--elements", "ee"],
+            "the argument '--elements <KINDS>' cannot be used with '[INPUT]' (see pbig pairs --help)",
+        ),
         (&["pairs"], "the following required arguments were not provided: <INPUT> (see pbig pairs --help)"),
     ] {
         assert_eq!(line(args), wanted, "{args:?}");

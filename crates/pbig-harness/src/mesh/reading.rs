@@ -9,6 +9,9 @@ use std::path::Path;
 /// Maximum length of a line, in bytes. A strip of triangles may have millions of vertices.
 pub(super) const MAX_LINE_BYTES: usize = 64 << 20;
 
+/// The note on a file of vertices alone.
+pub const NO_ELEMENTS: &str = "no faces and no rods";
+
 /// Number of names that a list of skipped things shows.
 const MOST_NAMES: usize = 8;
 
@@ -80,7 +83,7 @@ impl Mesh {
             .iter()
             .map(|(oddity, (all, place))| format!("{}: {all}, the first in {place}", oddity.name()));
         let empty = match (self.faces.is_empty(), self.rods.is_empty()) {
-            (true, true) => Some("no faces and no rods".to_owned()),
+            (true, true) => Some(NO_ELEMENTS.to_owned()),
             (true, false) => Some("no faces; rods have edges and vertices".to_owned()),
             _ => None,
         };
