@@ -35,12 +35,10 @@ impl LookUp {
         let is_forced = task.config.engine == Some(Engine::LookUp);
         let most = if is_forced { u64::MAX } else { policy::look_up_to_nodes(world.present.len()) };
         let budget = Budget::new(most);
-        stage!(task.report, check, self.look_up((world, task.kept, index), &budget));
-        let events = &mut task.comparison.events;
-        events.gather(self.threads.iter().map(|thread| &thread.found));
-        let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
-        events.added.sort_unstable_by_key(word);
-        events.removed.sort_unstable_by_key(word);
+        stage!(task.report, check, {
+            self.look_up((world, task.kept, index), &budget);
+            self.gather(&mut task.comparison.events);
+        });
         let sum = |of: fn(&Thread) -> u64| self.threads.iter().map(of).sum::<u64>();
         let (mut nodes, mut met) = (sum(|thread| thread.nodes), sum(|thread| thread.met));
         if budget.is_over() {
@@ -53,6 +51,14 @@ impl LookUp {
         report.set_plan(Plan { algorithm: Algorithm::LookUp, boxes: world.noted.valid, ..Plan::default() });
         task.tree.note_look_ups(nodes, budget.is_over());
         !budget.is_over()
+    }
+
+    /// Joins what the threads have found, in the order of pairs.
+    fn gather(&self, events: &mut Differences) {
+        events.gather(self.threads.iter().map(|thread| &thread.found));
+        let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
+        events.added.sort_unstable_by_key(word);
+        events.removed.sort_unstable_by_key(word);
     }
 
     /// Looks the changed boxes up. Some are left out if the budget does not suffice.

@@ -23,6 +23,23 @@ fn many_gone_and_one_new_take_few_tests() {
 }
 
 #[test]
+fn a_clone_goes_on_as_the_original() {
+    let mut broad_phase = BroadPhase::default();
+    let crowd = |ids: std::ops::Range<u32>, by: f32| {
+        ids.map(move |id| (3 * id, cube(lattice(id, 20).map(|x| 1.1 * x + by), [0.5, 3.0][id as usize % 2])))
+    };
+    update(&mut broad_phase, crowd(0..8000, 0.0));
+    let mut clone = broad_phase.clone();
+    for one in [&mut broad_phase, &mut clone] {
+        // An id that had no box before, too.
+        update(one, crowd(100..200, 0.01).chain([(1, cube([0.3; 3], 0.1))]));
+        assert_eq!(algorithm(one), Algorithm::LookUp);
+        assert_right(one, "a clone, or its original");
+    }
+    assert_eq!(broad_phase.events(), clone.events());
+}
+
+#[test]
 fn an_id_far_above_the_others_is_an_error_and_takes_no_memory() {
     let mut broad_phase = BroadPhase::default();
     let cube = Aabb::new([0.0; 3], [1.0; 3]);
@@ -82,11 +99,16 @@ fn many_boxes_set_on_threads_are_those_set_one_by_one() {
         let (mut many, mut single) = (BroadPhase::default(), BroadPhase::default());
         for round in 0..5 {
             let ids: Vec<u32> = (0..n).filter(|id| round > 2 || id % 4 > round).collect();
+            let was_there: Vec<bool> = (0..n).map(|id| single.contains(id)).collect();
             assert_eq!(many.set_many(&ids, |id| place(id, round)), Ok(()));
             let set = ids.iter().filter_map(|id| place(*id, round).map(|(aabb, filter)| (*id, aabb, filter)));
             set.for_each(|(id, aabb, filter)| single.set(id, aabb, filter).unwrap());
-            let mut changes = [many.changes().to_vec(), single.changes().to_vec()];
-            changes.iter_mut().for_each(|changes| changes.sort_unstable());
+            // In the same order, but those that are inserted come last.
+            let changes = [&many, &single].map(|one| {
+                let (known, new): (Vec<u32>, Vec<u32>) =
+                    one.changes().iter().partition(|id| was_there[**id as usize]);
+                [known, new].concat()
+            });
             assert_eq!(changes[0], changes[1], "round {round}");
             assert_eq!(many.world.noted.arrived, single.world.noted.arrived, "round {round}");
             assert_eq!(many.update(), single.update(), "round {round}");
@@ -94,10 +116,10 @@ fn many_boxes_set_on_threads_are_those_set_one_by_one() {
         }
         many
     };
-    for threads in [1, 2, 4] {
+    for (threads, at) in [(1, n - 5), (2, 5), (2, n - 5), (4, n - 5)] {
         on_threads(threads, || {
             let (mut many, ids) = (through_rounds(), (0..n).collect::<Vec<u32>>());
-            let planted = |id: u32| if id == n - 5 { panic!("planted") } else { place(id, 7) };
+            let planted = |id: u32| if id == at { panic!("planted") } else { place(id, 7) };
             let panics = std::panic::AssertUnwindSafe(|| many.set_many(&ids, planted));
             assert!(std::panic::catch_unwind(panics).is_err());
             // The boxes that were set before the panic are not lost.
