@@ -68,7 +68,9 @@ impl App {
     fn open() -> Result<Self, Failure> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()))?;
+        // By default a buffer has at most 128 MiB: 5.6 million boxes.
+        let limits = wgpu::DeviceDescriptor { required_limits: adapter.limits(), ..Default::default() };
+        let (device, queue) = pollster::block_on(adapter.request_device(&limits))?;
         Ok(Self {
             finder: GpuFinder::from_device(device.clone(), queue.clone())?,
             move_boxes: pipeline(&device, MOVE),

@@ -49,12 +49,31 @@ impl BackendArgs {
     /// Returns the device to search on, if one is asked for.
     fn device(&self) -> Result<Option<Box<dyn PairDevice>>, Failure> {
         self.check_options()?;
-        let Some(name) = &self.adapter else {
-            return Ok(shared_gpu(self.kind.backend(), GpuOptions::DEFAULT));
+        let device = match &self.adapter {
+            None => shared_gpu(self.kind.backend(), GpuOptions::DEFAULT),
+            Some(name) => {
+                let gpu = pbig_gpu::adapter(Some(name)).and_then(|adapter| GpuFinder::on(&adapter));
+                let gpu = gpu.map_err(|error| Failure::Input(format!("--adapter {name}: {error}")))?;
+                Some(Box::new(gpu) as Box<dyn PairDevice>)
+            }
         };
-        let gpu = pbig_gpu::adapter(Some(name)).and_then(|adapter| GpuFinder::on(&adapter));
-        let gpu = gpu.map_err(|error| Failure::Input(format!("--adapter {name}: {error}")))?;
-        Ok(Some(Box::new(gpu)))
+        let name = device.as_ref().and_then(|device| device.name());
+        name.map_or(Ok(()), |name| self.check_adapter(name))?;
+        Ok(device)
+    }
+
+    /// Warns of a software adapter, or refuses it, before its long work.
+    fn check_adapter(&self, name: &str) -> Result<(), Failure> {
+        if !is_software(name) {
+            return Ok(());
+        }
+        if self.require_gpu {
+            return Err(Failure::Check(format!("--require-gpu: {name} is a software adapter")));
+        }
+        warn(&format!(
+            "{name} is a program on the CPU, slower than --backend cpu; `pbig doctor` says why no GPU is found"
+        ));
+        Ok(())
     }
 
     /// Refuses options that would have no effect.
@@ -73,17 +92,13 @@ impl BackendArgs {
         of_gpu.into_iter().find_map(|(option, is_given)| is_given.then_some(option))
     }
 
-    /// Warns of a software adapter, and of work that no GPU did. If a GPU is required and did not do all the work, fails with the reason.
+    /// Warns of work that no GPU did. If a GPU is required and did not do all the work, fails with the reason.
     pub(crate) fn check_use(&self, adapter: Option<&str>, fallback: Option<&str>) -> Result<(), Failure> {
         if let (true, Some(why)) = (self.require_gpu, no_gpu(adapter, fallback)) {
             return Err(Failure::Check(format!("--require-gpu: {why}")));
         }
-        match (adapter.filter(|name| is_software(name)), fallback) {
-            (Some(name), _) => warn(&format!(
-                "{name} is a program on the CPU, slower than --backend cpu; `pbig doctor` says why no GPU is found"
-            )),
-            (None, Some(why)) => warn(&format!("{}; `pbig doctor` says more", plain(why))),
-            _ => {}
+        if let Some(why) = fallback {
+            warn(&format!("{}; `pbig doctor` says more", plain(why)));
         }
         Ok(())
     }

@@ -97,7 +97,7 @@ fn advice(candidates: &[Candidate]) -> Option<String> {
         return None;
     }
     let causes = [wrong_api(), missing_driver()].into_iter().flatten();
-    Some(format!("no GPU is found: {}{INSTALL}", causes.map(|cause| cause + "; ").collect::<String>()))
+    Some(format!("no GPU is found: {}{INSTALL}", causes.map(|cause| cause + ", or ").collect::<String>()))
 }
 
 /// The API of this system's GPUs.
@@ -167,12 +167,13 @@ fn describe((i, Candidate { adapter, opened, is_used }): (usize, &Candidate)) ->
     let error = opened.as_ref().err().map_or(String::new(), |why| format!("\n    not usable: {why}"));
     format!(
         "adapter gpu {i}: {}, driver {} {}{chosen}\n    \
-         limits: buffers {} MiB, bindings {} MiB, {} storage buffers, {} invocations, {} KiB workgroup memory{error}",
+         limits: buffers {} MiB, bindings {} MiB (at most {} boxes), {} storage buffers, {} invocations, {} KiB workgroup memory{error}",
         pbig_gpu::describe(&info),
         info.driver,
         info.driver_info,
         mib(limits.max_buffer_size),
         mib(limits.max_storage_buffer_binding_size),
+        limits.max_storage_buffer_binding_size / size_of::<Aabb>() as u64,
         limits.max_storage_buffers_per_shader_stage,
         limits.max_compute_invocations_per_workgroup,
         limits.max_compute_workgroup_storage_size >> 10,

@@ -8,7 +8,7 @@ use rapier_pbig::{PbigBroadPhase, PbigConfig};
 /// `--backend`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum BackendOption {
-    /// The backend that the policy chooses.
+    /// The backend that the policy chooses: here the CPU.
     #[default]
     Auto,
     /// The CPU.

@@ -128,14 +128,13 @@ fn doctor_obeys_what_pairs_obeys() {
     let (text, object) = doctor("WGPU_BACKEND", if cfg!(target_os = "windows") { "metal" } else { "dx12" });
     assert!(text.contains("adapters: none; `--backend gpu` falls back to the CPU: no GPU adapter; found: none; WGPU_BACKEND="), "{text}");
     assert!(
-        text.contains(": unset it; install its driver with Vulkan")
+        text.contains(": unset it, or install its driver with Vulkan")
             && object["adapters"] == serde_json::json!([]),
         "{text}"
     );
     if cfg!(target_os = "linux") {
         let (text, _) = doctor("VK_DRIVER_FILES", "/no/such.json");
-        let cause =
-            "no GPU is found: VK_DRIVER_FILES names /no/such.json, which does not exist: unset it; install";
+        let cause = "no GPU is found: VK_DRIVER_FILES names /no/such.json, which does not exist: unset it, or install";
         assert!(text.contains(cause) && !text.contains("WGPU_BACKEND"), "{text}");
     }
     let (text, object) = doctor("RAYON_NUM_THREADS", "1");
