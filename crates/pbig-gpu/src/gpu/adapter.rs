@@ -1,6 +1,6 @@
 //! The choice of an adapter.
 
-use super::GpuError;
+use super::error::{GpuError, Result};
 
 /// Returns all adapters, best first. Of several a browser shows one.
 pub(super) async fn best_first() -> Vec<wgpu::Adapter> {
@@ -30,7 +30,7 @@ fn rank(kind: wgpu::DeviceType, low_power: bool) -> usize {
 }
 
 /// Returns the adapter of the given name, or of `WGPU_ADAPTER_NAME`, or the best.
-pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
+pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter> {
     let [api, named] = ["WGPU_BACKEND", "WGPU_ADAPTER_NAME"].map(|name| std::env::var(name).ok());
     let all = best_first().await;
     let names: Vec<_> = all.iter().map(|adapter| adapter.get_info().name).collect();

@@ -1,9 +1,10 @@
 //! The forecast of a search, from the counts of earlier ones: its plan, and the lengths of its lists. A wrong plan costs time, a wrong
 //! length a repetition. A plan is kept until the boxes have outgrown it: until then planning costs nothing.
 
+use super::GpuPlan;
+use super::error::{GpuError, Result};
 use super::passes;
 use super::storage::Storage;
-use super::{GpuError, GpuPlan};
 use crate::GpuOptions;
 use crate::layout::{COUNTED, Cell, Counters, FILTERED, LANES, Params, Totals, UNPLANNED};
 use crate::pbig::Summary;
@@ -58,7 +59,6 @@ impl Forecast {
         self.is_outdated |= self.kept.as_ref().is_some_and(KeptPlan::is_new);
     }
 
-    /// Returns the plan.
     pub(super) fn plan(&self) -> Option<&GpuPlan> {
         self.kept.as_ref().map(|kept| &kept.plan)
     }
@@ -123,12 +123,7 @@ impl Forecast {
     }
 
     /// Makes the buffers of a call, and returns its parameters. Without a plan, only few boxes are searched.
-    pub(super) fn params(
-        &self,
-        storage: &mut Storage,
-        boxes: u32,
-        has_filters: bool,
-    ) -> Result<Params, GpuError> {
+    pub(super) fn params(&self, storage: &mut Storage, boxes: u32, has_filters: bool) -> Result<Params> {
         let mut params = self.without_capacities(storage, boxes, has_filters);
         let first_bytes = storage.options.first_bytes.saturating_mul(u64::from(boxes) + EXTRA_BOXES);
         let first_bytes = first_bytes.min(storage.max_buffer_bytes);
