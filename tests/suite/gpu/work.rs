@@ -168,6 +168,21 @@ fn exactly_the_pairs_come_down_when_their_number_grows_and_shrinks() {
     }
 }
 
+/// Contract: cells are chosen so that a box has few entries and few tests. The bytes that the map and the checks move follow from these.
+#[test]
+fn a_box_has_few_entries_and_few_tests() {
+    needs_gpu!();
+    for (name, most_entries, most_tests) in [("unit", 2.5, 18.0), ("mixed", 2.1, 15.0)] {
+        let boxes = set(name, 100_000);
+        let mut finder = untimed(GpuOptions::DEFAULT);
+        let (_, report) = find(&mut finder, &boxes);
+        let of_a_box = |count: u64| count as f64 / boxes.len() as f64;
+        let (entries, tests) = (of_a_box(report.entries), of_a_box(finder.report().checks.made));
+        let fits = entries <= most_entries && tests <= most_tests;
+        assert!(fits, "{name}: {entries} entries and {tests} tests a box");
+    }
+}
+
 /// A list that is longer than a piece comes in pieces, in order.
 #[test]
 fn a_list_of_several_pieces_is_complete_and_takes_a_wait_for_each() {
