@@ -126,7 +126,7 @@ fn an_apps_device_that_was_busy_is_used_again_when_it_is_idle() {
     let usual = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
     let no_time = GpuOptions { patience: Duration::ZERO, ..usual };
     let mut finder = Finder::with_device(config, Box::new(Hardware(finder, vec![usual, no_time])));
-    let boxes = set("pile", 100_000);
+    let boxes = set("pile", 20_000);
     let wanted = on_cpu(&boxes);
     let mut call = || {
         assert_eq!(difference(finder.find(&boxes).expect("few pairs"), &wanted), None);
