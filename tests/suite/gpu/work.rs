@@ -1,6 +1,6 @@
 //! The device's work, in counts: what a call sends, repeats and waits for, and which shapes it leaves to the CPU.
 
-use super::{cubes, find, on_cpu, set, with};
+use super::{PATIENCE, cubes, find, on_cpu, set, with};
 use pbig_core::{
     Aabb, Backend, BroadPhase, Config, DeviceFound, Finder, Order, PairDevice, ProxyFilter, SearchRequest,
 };
@@ -96,7 +96,7 @@ fn a_declined_call_is_the_cpus_and_the_next_may_be_the_devices() {
 
 /// Returns a finder on a device that always makes a grid, and times nothing.
 fn untimed(options: GpuOptions) -> Finder {
-    let options = GpuOptions { all_pairs_up_to: 0, ..options };
+    let options = GpuOptions { all_pairs_up_to: 0, patience: PATIENCE, ..options };
     let device = GpuFinder::new().expect("an adapter").with_options(options);
     let config = Config { backend: Backend::Device, ..Config::DEFAULT };
     Finder::with_device(config, Box::new(device))
@@ -310,7 +310,7 @@ fn more_pairs_than_one_dispatch_orders_come_in_order() {
     let wanted = on_cpu(&boxes);
     assert!(wanted.len() > 1 << 22);
     for time_kernels in [false, true] {
-        let options = GpuOptions { time_kernels, ..GpuOptions::DEFAULT };
+        let options = GpuOptions { time_kernels, patience: PATIENCE, ..GpuOptions::DEFAULT };
         let mut gpu = GpuFinder::new().expect("an adapter").with_options(options);
         for call in 0..2 {
             let request =
@@ -364,7 +364,7 @@ fn a_plan_outlives_a_call_that_is_too_large() {
 #[test]
 fn many_boxes_have_a_grid_whatever_the_option() {
     needs_gpu!();
-    let options = GpuOptions { all_pairs_up_to: u32::MAX, ..GpuOptions::DEFAULT };
+    let options = GpuOptions { all_pairs_up_to: u32::MAX, patience: PATIENCE, ..GpuOptions::DEFAULT };
     let gpu = GpuFinder::new().expect("an adapter").with_options(options);
     let config = Config { backend: Backend::Device, ..Config::DEFAULT };
     let mut finder = Finder::with_device(config, Box::new(gpu));
