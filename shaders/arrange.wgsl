@@ -5,14 +5,7 @@
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> counters: Counters;
 // Arguments of indirect dispatches: small items, large items.
-@group(0) @binding(3) var<storage, read_write> dispatches: array<u32, 6>;
-
-// Writes the arguments of an indirect dispatch of this number of workgroups.
-fn write_dispatch(at: u32, groups: u32) {
-    dispatches[at] = min(groups, GROUPS_PER_ROW);
-    dispatches[at + 1u] = (groups + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW;
-    dispatches[at + 2u] = 1u;
-}
+@group(0) @binding(3) var<storage, read_write> dispatches: array<array<u32, 3>, 2>;
 
 // Returns the number of a chunk's work items, of all that there are.
 fn items_of(all: u32, first: u32, most: u32) -> u32 {
@@ -21,6 +14,6 @@ fn items_of(all: u32, first: u32, most: u32) -> u32 {
 
 @compute @workgroup_size(1)
 fn arrange() {
-    write_dispatch(0u, items_of(counters.small_items, chunk.first_small, chunk.small_items));
-    write_dispatch(3u, items_of(counters.large_items, chunk.first_large, chunk.large_items));
+    dispatches[0] = dispatch_of(items_of(counters.small_items, chunk.first_small, chunk.small_items));
+    dispatches[1] = dispatch_of(items_of(counters.large_items, chunk.first_large, chunk.large_items));
 }

@@ -21,21 +21,13 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         pair = pair_at(first + lane, n);
         let found = overlap(ordered_box(boxes[pair.x]), ordered_box(boxes[pair.y]));
         note_test(2u, u32(found));
-        hit = found && (!has_flag(FILTERED) || filters_allow(filters[pair.x], filters[pair.y]));
-    }
-    var rank = 0u;
-    if hit {
-        rank = atomicAdd(&tally[HITS], 1u);
+        hit = found && allowed(pair.x, pair.y);
     }
     if lane == 0u {
         atomicStore(&tally[0], min(LANES, all - first));
     }
-    workgroupBarrier();
-    if lane == 0u {
-        placed = place();
-    }
-    let at = workgroupUniformLoad(&placed);
+    let at = reserve(lane, u32(hit));
     if hit && at != NO_SPACE {
-        write_pair(at + 2u * rank, pair.x, pair.y);
+        write_pair(at, pair.x, pair.y);
     }
 }

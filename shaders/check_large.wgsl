@@ -114,8 +114,6 @@ fn test_partners(lane: u32, entry: u32, one: DeviceBox, s: Segments) -> u32 {
                 continue;
             }
             counts.x += 1u;
-            let a = box_of(entry);
-            let b = box_of(staged_entries[j]);
             if !owns(entry, staged_entries[j]) {
                 counts.y += 1u;
                 continue;
@@ -124,7 +122,7 @@ fn test_partners(lane: u32, entry: u32, one: DeviceBox, s: Segments) -> u32 {
                 continue;
             }
             counts.z += 1u;
-            if !has_flag(FILTERED) || filters_allow(filters[a], filters[b]) {
+            if allowed(box_of(entry), box_of(staged_entries[j])) {
                 bits |= 1u << (k % 32u);
             }
         }
@@ -173,19 +171,9 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         let entry = stage(item, lane, s);
         let one = ordered_box(boxes[box_of(entry)]);
         let hits = test_partners(lane, entry, one, s);
-        // Algorithm 2, line 26, takes a prefix sum here. The rows may come in any order, so atomics are enough: 1 barrier
-        // instead of 17.
-        var rank = 0u;
-        if hits > 0u {
-            rank = atomicAdd(&tally[HITS], hits);
-        }
-        workgroupBarrier();
-        if lane == 0u {
-            placed = place();
-        }
-        let at = workgroupUniformLoad(&placed);
+        let at = reserve(lane, hits);
         if hits > 0u && at != NO_SPACE {
-            write_pairs(at + 2u * rank, lane, entry, s);
+            write_pairs(at, lane, entry, s);
         }
     }
 }

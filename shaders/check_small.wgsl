@@ -74,8 +74,6 @@ fn box_at(place: u32, staged: Stage) -> DeviceBox {
 fn is_pair(one: u32, other: u32, staged: Stage) -> bool {
     let a = entry_at(one, staged);
     let b = entry_at(other, staged);
-    let i = box_of(a);
-    let j = box_of(b);
     if !owns(a, b) {
         note_test(1u, 1u);
         return false;
@@ -84,7 +82,7 @@ fn is_pair(one: u32, other: u32, staged: Stage) -> bool {
         return false;
     }
     note_test(2u, 1u);
-    return !has_flag(FILTERED) || filters_allow(filters[i], filters[j]);
+    return allowed(box_of(a), box_of(b));
 }
 
 @compute @workgroup_size(LANES)
@@ -112,22 +110,13 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         pair = pair_at(item.first_pair + lane - cell.first_pair, cell.shape & 0xffffu);
         hit = is_pair(start + pair.x, start + pair.y, staged);
     }
-    // The hits may come in any order, so no prefix sum is needed.
-    var rank = 0u;
-    if hit {
-        rank = atomicAdd(&tally[HITS], 1u);
-    }
     if lane == 0u {
         atomicStore(&tally[0], item.pairs);
     }
-    workgroupBarrier();
-    if lane == 0u {
-        placed = place();
-    }
-    let at = workgroupUniformLoad(&placed);
+    let at = reserve(lane, u32(hit));
     if hit && at != NO_SPACE {
         let a = entry_at(start + pair.x, staged);
         let b = entry_at(start + pair.y, staged);
-        write_pair(at + 2u * rank, box_of(a), box_of(b));
+        write_pair(at, box_of(a), box_of(b));
     }
 }

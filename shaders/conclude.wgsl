@@ -23,11 +23,8 @@ fn conclude() {
     let words = totals.words;
     let found = select((words.x >> 1u) | (words.y << 31u), 0xffffffffu, words.y > 1u);
     let pairs = select(0u, found, now == COMPLETE);
-    let groups = (pairs + LANES - 1u) / LANES;
     pair_count.pairs = pairs;
     pair_count.status = now;
     pair_count.needed = found;
-    pair_count.dispatch[0] = min(groups, GROUPS_PER_ROW);
-    pair_count.dispatch[1] = (groups + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW;
-    pair_count.dispatch[2] = 1u;
+    pair_count.dispatch = dispatch_of((pairs + LANES - 1u) / LANES);
 }

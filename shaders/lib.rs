@@ -15,82 +15,69 @@
 #[doc = include_str!("README.md")]
 struct Readme;
 
-/// A buffer that kernels bind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Buffer {
+/// Declares [`Buffer`]: each buffer once, with its name.
+macro_rules! buffers {
+    ($($(#[$doc:meta])* $buffer:ident $name:literal;)*) => {
+        /// A buffer that kernels bind.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Buffer { $($(#[$doc])* $buffer),* }
+
+        impl Buffer {
+            /// Returns the name of the variable in WGSL, which is also the label in a GPU debugger.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$buffer => $name),* }
+            }
+        }
+    };
+}
+
+buffers! {
     /// Parameters of a call.
-    Params,
+    Params "params";
     /// The range of work items of a submission.
-    Chunk,
+    Chunk "chunk";
     /// Boxes.
-    Boxes,
+    Boxes "boxes";
     /// Filters of the boxes.
-    Filters,
+    Filters "filters";
     /// Cells and level of each box.
-    Located,
+    Located "located";
     /// Entries of each cell: counts, then ends of its lists, then their starts.
-    Cells,
+    Cells "cells";
     /// Entries in the blocks before each block of cells, or pairs before each block of rows.
-    Sums,
+    Sums "sums";
     /// Lengths of the lists that the device makes.
-    Counters,
+    Counters "counters";
     /// Small cells with work.
-    Slots,
+    Slots "slots";
     /// Work items of small cells.
-    SmallItems,
+    SmallItems "small_items";
     /// Work items of large cells.
-    LargeItems,
+    LargeItems "large_items";
     /// Boxes of all cells.
-    Entries,
+    Entries "entries";
     /// Sizes of indirect dispatches.
-    Dispatches,
+    Dispatches "dispatches";
     /// Counts of the checks.
-    Totals,
+    Totals "totals";
     /// Pairs.
-    Out,
+    Out "out";
     /// Pairs of each first box: counts, then ends, then starts.
-    Rows,
+    Rows "rows";
     /// Pairs by first box.
-    Grouped,
+    Grouped "grouped";
     /// Size of the indirect dispatch for the pieces of long rows, and these pieces. The kernel that lists them is dispatched
     /// indirectly itself, and may not write what it is dispatched from.
-    LongRows,
+    LongRows "long_rows";
     /// Number of pairs in each window of the long rows.
-    Windows,
+    Windows "windows";
     /// Sizes of boxes that live on the device, and a sample of them.
-    Summary,
+    Summary "summary";
     /// Number of pairs that stay on the device, and whether they are all.
-    PairCount,
+    PairCount "pair_count";
 }
 
 impl Buffer {
-    /// Returns the name of the variable in WGSL, which is also the label in a GPU debugger.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Params => "params",
-            Self::Chunk => "chunk",
-            Self::Boxes => "boxes",
-            Self::Filters => "filters",
-            Self::Located => "located",
-            Self::Cells => "cells",
-            Self::Sums => "sums",
-            Self::Counters => "counters",
-            Self::Slots => "slots",
-            Self::SmallItems => "small_items",
-            Self::LargeItems => "large_items",
-            Self::Entries => "entries",
-            Self::Dispatches => "dispatches",
-            Self::Totals => "totals",
-            Self::Out => "out",
-            Self::Rows => "rows",
-            Self::Grouped => "grouped",
-            Self::LongRows => "long_rows",
-            Self::Windows => "windows",
-            Self::Summary => "summary",
-            Self::PairCount => "pair_count",
-        }
-    }
-
     /// Returns true if kernels bind the buffer as a uniform.
     pub const fn is_uniform(self) -> bool {
         matches!(self, Self::Params | Self::Chunk)

@@ -4,8 +4,6 @@
 @group(0) @binding(1) var<storage, read_write> sums: array<u32>;
 @group(0) @binding(2) var<storage, read_write> counters: Counters;
 
-const COUNTS_PER_BLOCK = 1024u;
-
 @compute @workgroup_size(LANES)
 fn scan_sums(@builtin(local_invocation_index) lane: u32) {
     let blocks = (scanned() + COUNTS_PER_BLOCK - 1u) / COUNTS_PER_BLOCK;

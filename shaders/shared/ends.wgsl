@@ -2,8 +2,6 @@
 // an inclusive prefix sum, and for each block the sum of those before. A scatter fills each list from its end and leaves
 // its start there.
 
-const COUNTS_PER_BLOCK = 1024u;
-
 // Returns the sum of the blocks before that of a list.
 fn block_start(list: u32) -> u32 {
     return sums[list / COUNTS_PER_BLOCK];

@@ -2,6 +2,8 @@
 
 // Lanes of a workgroup, and boxes of a segment (PBIG 5.2).
 const LANES = 256u;
+// Lists of a workgroup of the scan.
+const COUNTS_PER_BLOCK = 1024u;
 // Maximum number of levels of cells. The last level has one cell for everything.
 const MAX_LEVELS = 8u;
 // Maximum number of cells that a box touches along one axis of its level.

@@ -20,9 +20,13 @@ fn set(name: &str, n: usize) -> Vec<Aabb> {
     pbig_tests::set(name, n, 5)
 }
 
+/// Patience of tests in which no device hangs: a software one on a busy machine takes minutes for some calls.
+const PATIENCE: Duration = Duration::from_secs(600);
+
 /// Returns settings for a device that always makes a grid.
 fn with(options: GpuOptions) -> Way {
-    let gpu = GpuOptions { all_pairs_up_to: 0, count_tests: true, time_kernels: true, ..options };
+    let patience = PATIENCE;
+    let gpu = GpuOptions { all_pairs_up_to: 0, count_tests: true, time_kernels: true, patience, ..options };
     Way { gpu, ..pbig_tests::gpu() }
 }
 

@@ -121,20 +121,24 @@ fn a_hung_device_costs_the_patience_once() {
 #[test]
 fn an_apps_device_that_was_busy_is_used_again_when_it_is_idle() {
     needs_gpu!();
-    let App { finder, .. } = App::new(GpuOptions::DEFAULT);
+    let App { device, finder, .. } = App::new(GpuOptions::DEFAULT);
     let config = Config { backend: Backend::Device, ..Config::DEFAULT };
     let usual = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
     let no_time = GpuOptions { patience: Duration::ZERO, ..usual };
     let mut finder = Finder::with_device(config, Box::new(Hardware(finder, vec![usual, no_time])));
-    let boxes = set("pile", 100_000);
+    let boxes = set("pile", 20_000);
     let wanted = on_cpu(&boxes);
-    let mut whys = Vec::new();
-    while whys.len() < 100 && whys.last() != Some(&None) {
+    let mut call = || {
         assert_eq!(difference(finder.find(&boxes).expect("few pairs"), &wanted), None);
-        whys.push(finder.report().fallback.clone());
-    }
-    assert!(whys[0].as_ref().is_some_and(|why| why.contains("did not answer")), "{:?}", whys[0]);
-    assert_eq!(whys.last(), Some(&None), "after {} calls", whys.len());
+        finder.report().fallback.clone()
+    };
+    let why = call().expect("it had no time");
+    assert!(why.contains("did not answer"), "{why}");
+    // The device may be busy yet: a software one compiles kernels for seconds.
+    call();
+    device.poll(wgpu::PollType::wait_indefinitely()).expect("a device that works");
+    // Other processes may delay the answer of an idle device.
+    assert!((0..100).any(|_| call().is_none()), "an idle device is used again");
 }
 
 #[test]

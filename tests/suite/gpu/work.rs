@@ -1,6 +1,6 @@
 //! The device's work, in counts: what a call sends, repeats and waits for, and which shapes it leaves to the CPU.
 
-use super::{cubes, find, on_cpu, set, with};
+use super::{PATIENCE, cubes, find, on_cpu, set, with};
 use pbig_core::{
     Aabb, Backend, BroadPhase, Config, DeviceFound, Finder, Order, PairDevice, ProxyFilter, SearchRequest,
 };
@@ -96,7 +96,7 @@ fn a_declined_call_is_the_cpus_and_the_next_may_be_the_devices() {
 
 /// Returns a finder on a device that always makes a grid, and times nothing.
 fn untimed(options: GpuOptions) -> Finder {
-    let options = GpuOptions { all_pairs_up_to: 0, ..options };
+    let options = GpuOptions { all_pairs_up_to: 0, patience: PATIENCE, ..options };
     let device = GpuFinder::new().expect("an adapter").with_options(options);
     let config = Config { backend: Backend::Device, ..Config::DEFAULT };
     Finder::with_device(config, Box::new(device))
@@ -165,6 +165,21 @@ fn exactly_the_pairs_come_down_when_their_number_grows_and_shrinks() {
                 assert!(down >= bytes + 64, "call {call}: {down}");
             }
         }
+    }
+}
+
+/// Contract: cells are chosen so that a box has few entries and few tests. The bytes that the map and the checks move follow from these.
+#[test]
+fn a_box_has_few_entries_and_few_tests() {
+    needs_gpu!();
+    for (name, most_entries, most_tests) in [("unit", 2.5, 18.0), ("mixed", 2.1, 15.0)] {
+        let boxes = set(name, 100_000);
+        let mut finder = untimed(GpuOptions::DEFAULT);
+        let (_, report) = find(&mut finder, &boxes);
+        let of_a_box = |count: u64| count as f64 / boxes.len() as f64;
+        let (entries, tests) = (of_a_box(report.entries), of_a_box(finder.report().checks.made));
+        let fits = entries <= most_entries && tests <= most_tests;
+        assert!(fits, "{name}: {entries} entries and {tests} tests a box");
     }
 }
 
@@ -295,7 +310,7 @@ fn more_pairs_than_one_dispatch_orders_come_in_order() {
     let wanted = on_cpu(&boxes);
     assert!(wanted.len() > 1 << 22);
     for time_kernels in [false, true] {
-        let options = GpuOptions { time_kernels, ..GpuOptions::DEFAULT };
+        let options = GpuOptions { time_kernels, patience: PATIENCE, ..GpuOptions::DEFAULT };
         let mut gpu = GpuFinder::new().expect("an adapter").with_options(options);
         for call in 0..2 {
             let request =
@@ -349,7 +364,7 @@ fn a_plan_outlives_a_call_that_is_too_large() {
 #[test]
 fn many_boxes_have_a_grid_whatever_the_option() {
     needs_gpu!();
-    let options = GpuOptions { all_pairs_up_to: u32::MAX, ..GpuOptions::DEFAULT };
+    let options = GpuOptions { all_pairs_up_to: u32::MAX, patience: PATIENCE, ..GpuOptions::DEFAULT };
     let gpu = GpuFinder::new().expect("an adapter").with_options(options);
     let config = Config { backend: Backend::Device, ..Config::DEFAULT };
     let mut finder = Finder::with_device(config, Box::new(gpu));

@@ -29,7 +29,7 @@ impl Twin {
 
 /// The twins, in the order in which the kernels run. The kernels of the sort have none.
 pub(super) static TWINS: [Twin; 13] = [
-    Twin { kernel: &shaders::MEASURE, run: measure, groups: by_box, compare: None },
+    Twin { kernel: &shaders::MEASURE, run: measure, groups: by_box, compare: Some(compare_summaries) },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: None },
     Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: None },
     Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: None },

@@ -1,6 +1,6 @@
 //! The choice of an adapter.
 
-use super::GpuError;
+use super::error::{GpuError, Result};
 
 /// Returns all adapters, best first. Of several a browser shows one.
 pub(super) async fn best_first() -> Vec<wgpu::Adapter> {
@@ -30,32 +30,36 @@ fn rank(kind: wgpu::DeviceType, low_power: bool) -> usize {
 }
 
 /// Returns the adapter of the given name, or of `WGPU_ADAPTER_NAME`, or the best.
-pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
+pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter> {
     let [api, named] = ["WGPU_BACKEND", "WGPU_ADAPTER_NAME"].map(|name| std::env::var(name).ok());
-    if let Some(api) = api.as_ref().filter(|api| wgpu::Backends::from_comma_list(api).is_empty()) {
-        let why = format!(": WGPU_BACKEND={api:?} names no API (known: vulkan, metal, dx12)");
-        return Err(GpuError::NoAdapter(why));
-    }
     let all = best_first().await;
     let names: Vec<_> = all.iter().map(|adapter| adapter.get_info().name).collect();
-    let cause = match (api, &named) {
-        (Some(api), _) if names.is_empty() => format!("; WGPU_BACKEND={api:?} leaves out other APIs"),
-        (_, Some(_)) if name.is_none() => "; WGPU_ADAPTER_NAME has that name".to_owned(),
-        _ => String::new(),
-    };
-    let place =
-        place_of(name.or(named.as_deref()), &names).map_err(|why| GpuError::NoAdapter(why + &cause))?;
+    let place = place_of(name, api.as_deref(), named.as_deref(), &names).map_err(GpuError::NoAdapter)?;
     Ok(all[place].clone())
 }
 
 /// Returns the place of the first adapter with the wanted name, or what was wanted and found. A part of the name is enough, in any
-/// case.
-fn place_of(wanted: Option<&str>, names: &[String]) -> Result<usize, String> {
+/// case. `api` and `named` are the values of `WGPU_BACKEND` and `WGPU_ADAPTER_NAME`.
+fn place_of(
+    name: Option<&str>,
+    api: Option<&str>,
+    named: Option<&str>,
+    names: &[String],
+) -> Result<usize, String> {
+    if let Some(api) = api.filter(|api| wgpu::Backends::from_comma_list(api).is_empty()) {
+        return Err(format!(": WGPU_BACKEND={api:?} names no API (known: vulkan, metal, dx12)"));
+    }
+    let wanted = name.or(named);
     let part = wanted.unwrap_or_default().to_lowercase();
     names.iter().position(|name| name.to_lowercase().contains(&part)).ok_or_else(|| {
         let wanted = wanted.map(|name| format!(" named {name:?}")).unwrap_or_default();
         let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-        format!("{wanted}; found: {found}")
+        let cause = match api {
+            Some(api) if names.is_empty() => format!("; WGPU_BACKEND={api:?} leaves out other APIs"),
+            _ if name.is_none() && named.is_some() => "; WGPU_ADAPTER_NAME has that name".to_owned(),
+            _ => String::new(),
+        };
+        format!("{wanted}; found: {found}{cause}")
     })
 }
 
@@ -83,13 +87,33 @@ mod tests {
     #[test]
     fn a_part_of_a_name_in_any_case_chooses_an_adapter() {
         let names = ["Iris Xe", "llvmpipe (LLVM 15)"].map(str::to_owned);
+        let of_call = [None, Some("xe"), Some("LLVMPIPE")].map(|name| place_of(name, None, None, &names));
+        assert_eq!(of_call, [Ok(0), Ok(0), Ok(1)]);
+        assert_eq!(place_of(None, None, Some("llvm"), &names), Ok(1), "the variable's");
+        assert_eq!(place_of(Some("iris"), None, Some("llvm"), &names), Ok(0), "the call's comes first");
+        assert_eq!(place_of(None, Some("vulkan"), None, &names), Ok(0));
+    }
+
+    #[test]
+    fn an_error_says_what_was_wanted_what_was_found_and_which_variable_is_the_cause() {
+        let names = ["Iris Xe", "llvmpipe (LLVM 15)"].map(str::to_owned);
+        let why = |name, api, named, names: &[String]| place_of(name, api, named, names).unwrap_err();
+        let found = r#" named "no such"; found: Iris Xe, llvmpipe (LLVM 15)"#;
+        assert_eq!(why(Some("no such"), None, None, &names), found);
         assert_eq!(
-            [None, Some("xe"), Some("LLVMPIPE")].map(|name| place_of(name, &names)),
-            [Ok(0), Ok(0), Ok(1)]
+            why(Some("no such"), Some("vulkan"), Some("xe"), &names),
+            found,
+            "no variable is the cause"
         );
-        let why = |wanted, names: &[String]| place_of(wanted, names).unwrap_err();
-        assert_eq!(why(Some("no such"), &names), r#" named "no such"; found: Iris Xe, llvmpipe (LLVM 15)"#);
-        assert_eq!(why(Some("no such"), &[]), r#" named "no such"; found: none"#);
-        assert_eq!(why(None, &[]), "; found: none");
+        let of_variable = format!("{found}; WGPU_ADAPTER_NAME has that name");
+        assert_eq!(why(None, None, Some("no such"), &names), of_variable);
+        assert_eq!(why(Some("no such"), None, None, &[]), r#" named "no such"; found: none"#);
+        assert_eq!(why(None, None, None, &[]), "; found: none");
+        let others = r#"; found: none; WGPU_BACKEND="metal" leaves out other APIs"#;
+        assert_eq!(why(None, Some("metal"), None, &[]), others);
+        let both = format!(r#" named "no such"{others}"#);
+        assert_eq!(why(None, Some("metal"), Some("no such"), &[]), both, "the API leaves out all adapters");
+        let unknown = r#": WGPU_BACKEND="cuda" names no API (known: vulkan, metal, dx12)"#;
+        assert_eq!(why(None, Some("cuda"), None, &names), unknown);
     }
 }

@@ -55,7 +55,15 @@ pub enum GpuError {
     Paused(String),
 }
 
+/// The result of what a device may fail to do.
+pub(super) type Result<T, E = GpuError> = std::result::Result<T, E>;
+
 impl GpuError {
+    /// Returns true if the device failed, so that the state of buffers and forecasts may be wrong.
+    pub(super) fn is_failure(&self) -> bool {
+        !matches!(self, Self::Argument(_) | Self::Busy | Self::Declined(_) | Self::TooManyPairs)
+    }
+
     /// Returns the error as the core knows it.
     pub(super) fn for_core(self) -> DeviceFailure {
         match self {

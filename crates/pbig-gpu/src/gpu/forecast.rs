@@ -1,9 +1,10 @@
 //! The forecast of a search, from the counts of earlier ones: its plan, and the lengths of its lists. A wrong plan costs time, a wrong
 //! length a repetition. A plan is kept until the boxes have outgrown it: until then planning costs nothing.
 
+use super::GpuPlan;
+use super::error::{GpuError, Result};
 use super::passes;
 use super::storage::Storage;
-use super::{GpuError, GpuPlan};
 use crate::GpuOptions;
 use crate::layout::{COUNTED, Cell, Counters, FILTERED, LANES, Params, Totals, UNPLANNED};
 use crate::pbig::Summary;
@@ -58,7 +59,6 @@ impl Forecast {
         self.is_outdated |= self.kept.as_ref().is_some_and(KeptPlan::is_new);
     }
 
-    /// Returns the plan.
     pub(super) fn plan(&self) -> Option<&GpuPlan> {
         self.kept.as_ref().map(|kept| &kept.plan)
     }
@@ -123,12 +123,7 @@ impl Forecast {
     }
 
     /// Makes the buffers of a call, and returns its parameters. Without a plan, only few boxes are searched.
-    pub(super) fn params(
-        &self,
-        storage: &mut Storage,
-        boxes: u32,
-        has_filters: bool,
-    ) -> Result<Params, GpuError> {
+    pub(super) fn params(&self, storage: &mut Storage, boxes: u32, has_filters: bool) -> Result<Params> {
         let mut params = self.without_capacities(storage, boxes, has_filters);
         let first_bytes = storage.options.first_bytes.saturating_mul(u64::from(boxes) + EXTRA_BOXES);
         let first_bytes = first_bytes.min(storage.max_buffer_bytes);
@@ -207,6 +202,82 @@ mod tests {
 
     fn counted(valid: u32, entries: u32, tests: u32) -> Counters {
         Counters { valid, entries, tests, ..Counters::default() }
+    }
+
+    /// Returns a forecast with a plan for this number of boxes, and the parameters of a search with it that has room for ten entries
+    /// and for 100 workgroups of tests.
+    fn planned(boxes: usize) -> (Forecast, Params) {
+        let kept = kept(boxes);
+        let (entry_capacity, most_tests) = (10, 100);
+        let params = Params { boxes: boxes as u32, entry_capacity, most_tests, ..kept.plan.params };
+        (Forecast { kept: Some(kept), ..Forecast::default() }, params)
+    }
+
+    /// Returns what a search has told: a new plan is needed, it gets finer cells, entries of the last map.
+    fn told(forecast: &Forecast) -> (bool, bool, u32) {
+        (forecast.is_outdated, forecast.is_finer, forecast.lists.entries)
+    }
+
+    #[test]
+    fn a_search_without_a_grid_is_complete_unless_it_waits_for_a_plan() {
+        let (mut forecast, planned) = planned(1000);
+        let all_pairs = Params { boxes: 1000, ..Params::default() };
+        let unplanned = Params { flags: FILTERED | UNPLANNED, ..all_pairs };
+        assert!(forecast.learn(&all_pairs, &counted(1000, 7, 1)));
+        assert!(!forecast.learn(&unplanned, &counted(1000, 7, 1)));
+        assert_eq!(told(&forecast), (false, false, 0), "they have no lists");
+        assert!(forecast.is_current(&planned) && !forecast.is_current(&unplanned));
+        assert!(Forecast::default().is_current(&unplanned) && !Forecast::default().is_current(&planned));
+    }
+
+    #[test]
+    fn a_search_tells_the_lengths_of_its_lists_whether_they_fit_or_not() {
+        let (mut forecast, params) = planned(1000);
+        forecast.is_finer = true;
+        assert!(!forecast.learn(&params, &counted(1000, 11, 1)));
+        assert_eq!(told(&forecast), (false, true, 11), "the repeat has finer cells, too");
+        assert!(forecast.learn(&params, &counted(1000, 10, 1)));
+        assert_eq!(told(&forecast), (false, false, 10));
+        assert!(!forecast.learn(&params, &counted(1000, 11, 100)));
+        assert_eq!(told(&forecast), (false, false, 11), "a repeat keeps the plan");
+        assert!(forecast.learn(&params, &counted(1000, 9, 100)));
+        assert_eq!(told(&forecast), (true, false, 9), "the work for a box has grown");
+    }
+
+    #[test]
+    fn nothing_is_learned_from_a_search_with_another_plan() {
+        let (mut forecast, _) = planned(1000);
+        let (other, params) = planned(100);
+        assert!(other.is_current(&params) && !forecast.is_current(&params));
+        assert!(!forecast.learn(&params, &counted(100, 7, 1)));
+        assert!(!forecast.learn(&params, &counted(100, 7, 101)));
+        assert!(!Forecast::default().learn(&params, &counted(100, 7, 1)));
+        assert_eq!(told(&forecast), (false, false, 0));
+    }
+
+    /// Cells that are too large for the boxes that they were made for become finer once. Other boxes get a plan of their own first.
+    #[test]
+    fn a_plan_of_too_many_tests_is_given_up_and_followed_by_finer_cells_if_it_was_new() {
+        let refused = |change: fn(&mut Forecast, &mut Params)| {
+            let (mut forecast, mut params) = planned(1000);
+            forecast.lists = counted(1000, 7, 1);
+            change(&mut forecast, &mut params);
+            assert!(!forecast.learn(&params, &counted(1000, 7, 101)));
+            told(&forecast)
+        };
+        assert_eq!(refused(|_, _| ()), (true, true, 0));
+        assert_eq!(refused(|it, _| it.is_finer = true), (true, false, 0), "finer cells are not enough");
+        assert_eq!(
+            refused(|it, params| _ = it.learn(params, &counted(1000, 7, 1))),
+            (true, false, 0),
+            "used before"
+        );
+        assert_eq!(refused(|_, params| params.boxes = 2001), (true, false, 0), "made for other boxes");
+        assert_eq!(refused(|it, _| it.is_outdated = true), (true, false, 0), "given up before");
+        let wrapped = Counters { too_many_tests: 1, ..counted(1000, 7, 1) };
+        let (mut forecast, params) = planned(1000);
+        assert!(!forecast.learn(&params, &wrapped));
+        assert_eq!(told(&forecast), (true, true, 0), "a number that wrapped around");
     }
 
     #[test]

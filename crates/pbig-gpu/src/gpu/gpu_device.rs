@@ -1,6 +1,7 @@
 //! The device: its pipelines, buffers and submissions.
 
-use super::{GpuError, adapter};
+use super::adapter;
+use super::error::{GpuError, Result};
 use pbig_shaders::Kernel;
 use std::collections::HashMap;
 use std::fmt;
@@ -48,7 +49,7 @@ impl fmt::Debug for GpuDevice {
 }
 
 impl GpuDevice {
-    pub(super) fn new(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, GpuError> {
+    pub(super) fn new(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self> {
         check_limits(&device.limits())?;
         let info = device.adapter_info();
         Ok(Self {
@@ -66,7 +67,7 @@ impl GpuDevice {
     }
 
     /// Opens a device on an adapter, with its limits and the features that pbig uses.
-    pub(super) async fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+    pub(super) async fn on(adapter: &wgpu::Adapter) -> Result<Self> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("pbig"),
             required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
@@ -81,7 +82,7 @@ impl GpuDevice {
 
     /// Returns the process's device, which finders without a device of their own share. Opening a device takes tenths
     /// of a second. A lost device is replaced.
-    pub(super) async fn shared() -> Result<Arc<Self>, GpuError> {
+    pub(super) async fn shared() -> Result<Arc<Self>> {
         static SHARED: Mutex<Option<Arc<GpuDevice>>> = Mutex::new(None);
         let usable = || lock(&SHARED).clone().filter(|device| !device.is_lost());
         if let Some(device) = usable() {
@@ -125,14 +126,10 @@ impl GpuDevice {
         })
     }
 
-    pub(super) fn buffer(
-        &self,
-        label: &str,
-        size: u64,
-        usage: wgpu::BufferUsages,
-        mapped_at_creation: bool,
-    ) -> wgpu::Buffer {
+    /// Makes a buffer. One that the host writes is mapped.
+    pub(super) fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
         self.buffers_made.fetch_add(1, Ordering::Relaxed);
+        let mapped_at_creation = usage.contains(wgpu::BufferUsages::MAP_WRITE);
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation };
         self.handle.create_buffer(&descriptor)
     }
@@ -140,14 +137,14 @@ impl GpuDevice {
     /// Gives the first bytes of a buffer that the host has mapped to `take`, and unmaps the buffer.
     pub(super) fn read<T>(
         &self,
-        mapped: &wgpu::Buffer,
+        from: &wgpu::Buffer,
         bytes: u64,
         take: impl FnOnce(&[u8]) -> T,
-    ) -> Result<T, GpuError> {
-        let view = mapped.get_mapped_range(0..bytes).map_err(|_| self.give_up())?;
+    ) -> Result<T> {
+        let view = from.get_mapped_range(0..bytes).map_err(|_| self.give_up())?;
         let taken = take(&view);
         drop(view);
-        mapped.unmap();
+        from.unmap();
         Ok(taken)
     }
 
@@ -172,7 +169,7 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 }
 
 /// Returns an error if the device lacks what every WebGPU device has.
-fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
+fn check_limits(limits: &wgpu::Limits) -> Result<()> {
     let needs = [
         ("storage buffers a stage", limits.max_storage_buffers_per_shader_stage.into(), 8),
         ("invocations a workgroup", limits.max_compute_invocations_per_workgroup.into(), 256),

@@ -29,6 +29,7 @@ pub use resident::{DeviceBoxes, DevicePairs};
 
 use crate::GpuOptions;
 use declined::Declined;
+use error::Result;
 use gpu_device::GpuDevice;
 use pbig_core::internal::Clock;
 use pbig_core::{DeviceFailure, DeviceFound, PairDevice, SearchRequest};
@@ -217,7 +218,7 @@ impl GpuFinder {
         let mut kept = self.resident.take().filter(|kept| kept.storage.suits(&device, &self.options));
         let resident = kept.get_or_insert_with(|| Resident::new(&device, &self.options));
         let result = device.watch_now(|| resident.record(encoder, boxes));
-        self.resident = kept.filter(|_| !is_failure(&result));
+        self.resident = kept.filter(|_| is_sound(&result));
         result
     }
 
@@ -237,51 +238,46 @@ impl GpuFinder {
     }
 
     /// Returns the device, which a page has opened before.
-    fn device_now(&mut self) -> Result<Arc<GpuDevice>, GpuError> {
+    fn device_now(&mut self) -> Result<Arc<GpuDevice>> {
         match &self.device {
             Some(device) if !device.is_lost() => Ok(device.clone()),
             _ => wait::block_on(self.open_device()),
         }
     }
 
-    async fn run(&mut self, request: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), GpuError> {
+    async fn run(&mut self, request: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<()> {
         self.check_pause()?;
         let boxes = request.boxes.len();
         if let Some(why) = self.declined.unseen(boxes) {
             return Err(GpuError::Declined(why));
         }
         let result = self.try_run(request, found).await;
+        self.failed = None;
         match &result {
             Ok(()) => self.declined = Declined::default(),
             Err(GpuError::Declined(why)) => self.declined.note(boxes, why),
+            Err(error) if error.is_failure() => self.failed = Some((Clock::start(), error.to_string())),
             Err(_) => {}
         }
-        let failure = result.as_ref().err().filter(|_| is_failure(&result));
-        self.failed = failure.map(|error| (Clock::start(), error.to_string()));
         result
     }
 
     /// Runs a search in a session that is kept unless the device failed.
-    async fn try_run(
-        &mut self,
-        request: &SearchRequest<'_>,
-        found: &mut DeviceFound,
-    ) -> Result<(), GpuError> {
-        let kept = self.session.take();
+    async fn try_run(&mut self, request: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<()> {
         let device = self.open_device().await?;
-        let mut kept = kept.filter(|kept| kept.storage.suits(&device, &self.options));
+        let mut kept = self.session.take().filter(|kept| kept.storage.suits(&device, &self.options));
         let search = async || {
             let session = kept.get_or_insert_with(|| Session::new(&device, &self.options));
             session.search(request, std::mem::take(&mut found.pairs)).await
         };
         let result = device.watch(search).await;
-        self.session = kept.filter(|_| !is_failure(&result));
+        self.session = kept.filter(|_| is_sound(&result));
         *found = result?;
         Ok(())
     }
 
     /// Returns an error while calls stay on the CPU because the device failed a short while ago.
-    fn check_pause(&self) -> Result<(), GpuError> {
+    fn check_pause(&self) -> Result<()> {
         let pause = self.options.pause;
         let Some((clock, why)) = &self.failed else { return Ok(()) };
         match clock.time() {
@@ -293,7 +289,7 @@ impl GpuFinder {
     }
 
     /// Returns the device, or another one if it was lost.
-    async fn open_device(&mut self) -> Result<Arc<GpuDevice>, GpuError> {
+    async fn open_device(&mut self) -> Result<Arc<GpuDevice>> {
         if let Some(device) = self.device.as_ref().filter(|device| !device.is_lost()) {
             return Ok(device.clone());
         }
@@ -313,10 +309,9 @@ impl GpuFinder {
     }
 }
 
-/// Returns true if the device failed, so that the state of buffers and forecasts may be wrong.
-fn is_failure<T>(result: &Result<T, GpuError>) -> bool {
-    use GpuError::{Argument, Busy, Declined, TooManyPairs};
-    !matches!(result, Ok(_) | Err(Argument(_) | Busy | Declined(_) | TooManyPairs))
+/// Returns true if buffers and forecasts are as they should be after a call with this result.
+fn is_sound<T>(result: &Result<T>) -> bool {
+    !result.as_ref().is_err_and(GpuError::is_failure)
 }
 
 impl PairDevice for GpuFinder {

@@ -1,6 +1,6 @@
 //! The kernels and buffers of a search, as tables.
 
-use super::GpuError;
+use super::error::Result;
 use super::storage::Storage;
 use super::timer::Timer;
 use crate::layout::{
@@ -9,6 +9,7 @@ use crate::layout::{
 };
 use pbig_core::Pair;
 use pbig_shaders::{self as shaders, Buffer, Kernel};
+use wgpu::CommandEncoder;
 
 /// The number of workgroups of a kernel.
 #[derive(Clone, Copy, Debug)]
@@ -67,7 +68,6 @@ pub(super) fn check_all(params: &Params) -> [Step; 2] {
     [CLEAR_TOTALS, Run(&shaders::CHECK_ALL, Direct(groups as u32))]
 }
 
-/// Returns the number of pairs of this number of boxes.
 pub(super) fn pair_count(boxes: u32) -> u64 {
     u64::from(boxes) * u64::from(boxes.saturating_sub(1)) / 2
 }
@@ -116,7 +116,7 @@ pub(super) fn make_buffers(
     params: &mut Params,
     needed: &Counters,
     first_bytes: u64,
-) -> Result<(), GpuError> {
+) -> Result<()> {
     let lists = (2 * params.cells).max(params.boxes);
     storage.ensure(Buffer::Located, bytes_of::<Located>(params.boxes))?;
     storage.ensure(Buffer::Cells, bytes_of::<Cell>(params.cells))?;
@@ -133,18 +133,13 @@ pub(super) fn make_buffers(
 }
 
 /// Makes a buffer of at least this number of elements, and of at least `first_bytes`. Returns the number of elements that fit.
-fn make_list<T>(
-    storage: &mut Storage,
-    buffer: Buffer,
-    needed: u32,
-    first_bytes: u64,
-) -> Result<u32, GpuError> {
+fn make_list<T>(storage: &mut Storage, buffer: Buffer, needed: u32, first_bytes: u64) -> Result<u32> {
     storage.ensure(buffer, bytes_of::<T>(needed).max(first_bytes))?;
     Ok(u32::try_from(storage.size(buffer) / size_of::<T>() as u64).unwrap_or(u32::MAX))
 }
 
 /// Makes the buffers of the sort of this number of pairs.
-pub(super) fn make_sort_buffers(storage: &mut Storage, boxes: u32, pairs: u32) -> Result<(), GpuError> {
+pub(super) fn make_sort_buffers(storage: &mut Storage, boxes: u32, pairs: u32) -> Result<()> {
     storage.ensure(Buffer::Rows, bytes_of::<u32>(boxes))?;
     storage.ensure(Buffer::Grouped, bytes_of::<Pair>(pairs))?;
     storage.ensure(Buffer::Windows, windows_bytes(boxes, pairs))?;
@@ -179,7 +174,7 @@ pub(super) fn tests_fit(params: &Params, found: &Counters) -> bool {
 /// Records steps: first everything that is cleared, then the kernels. They share a pass, unless each is timed.
 pub(super) fn record(
     storage: &mut Storage,
-    encoder: &mut wgpu::CommandEncoder,
+    encoder: &mut CommandEncoder,
     steps: &[Step],
     timer: Option<&mut Timer>,
 ) {
@@ -199,7 +194,7 @@ pub(super) fn record(
 
 fn record_pass(
     storage: &mut Storage,
-    encoder: &mut wgpu::CommandEncoder,
+    encoder: &mut CommandEncoder,
     kernels: &[(&'static Kernel, Groups)],
     timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>,
 ) {

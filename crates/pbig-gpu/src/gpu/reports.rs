@@ -9,6 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use pbig_shaders::Buffer;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use wgpu::CommandEncoder;
 
 /// Maximum number of calls whose counts are on their way. The counts of further calls stay on the device.
 const MOST_REPORTS: usize = 4;
@@ -26,8 +27,7 @@ pub(super) struct Counts {
 impl Counts {
     pub(super) const BYTES: u64 = size_of::<Self>() as u64;
 
-    /// Records the copy of the counts to the start of a staging buffer.
-    pub(super) fn copy(storage: &Storage, encoder: &mut wgpu::CommandEncoder, staging: &wgpu::Buffer) {
+    pub(super) fn copy(storage: &Storage, encoder: &mut CommandEncoder, staging: &wgpu::Buffer) {
         let [counters, totals] = [size_of::<Counters>() as u64, size_of::<Totals>() as u64];
         encoder.copy_buffer_to_buffer(storage.get(Buffer::Counters), 0, staging, 0, counters);
         encoder.copy_buffer_to_buffer(storage.get(Buffer::Totals), 0, staging, counters, totals);
@@ -44,14 +44,13 @@ struct Report {
     has_summary: bool,
 }
 
-/// The buffers for reports.
 #[derive(Debug, Default)]
 pub(super) struct Reports(Vec<Report>);
 
 impl Report {
     fn new(device: &GpuDevice) -> Self {
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        let staging = device.buffer("report", Counts::BYTES + SUMMARY_BYTES, usage, false);
+        let staging = device.buffer("report", Counts::BYTES + SUMMARY_BYTES, usage);
         Self { staging, is_mapped: Arc::default(), params: Params::default(), has_summary: false }
     }
 
@@ -59,28 +58,21 @@ impl Report {
     fn is_free(&mut self) -> bool {
         Arc::get_mut(&mut self.is_mapped).is_some_and(|is_mapped| !*is_mapped.get_mut())
     }
-
-    /// Returns the counts and the summary.
-    fn of_bytes(&self, bytes: &[u8]) -> (Counts, Option<Summary>) {
-        let (counts, summary) = bytes.split_at(Counts::BYTES as usize);
-        let summary = || Summary::of_device(bytemuck::cast_slice(summary), self.params.boxes);
-        (bytemuck::pod_read_unaligned(counts), self.has_summary.then(summary))
-    }
 }
 
 impl Reports {
     /// Gives the reports that have arrived to `learn`, with the parameters of their calls. Does not wait for others.
-    pub(super) fn take(
-        &mut self,
-        device: &GpuDevice,
-        mut learn: impl FnMut(&Params, Counts, Option<Summary>),
-    ) {
+    pub(super) fn take(&self, device: &GpuDevice, mut learn: impl FnMut(&Params, Counts, Option<Summary>)) {
         device.poll_now();
         for report in self.0.iter().filter(|report| report.is_mapped.swap(false, Ordering::Acquire)) {
+            let params = &report.params;
             let bytes = Counts::BYTES + if report.has_summary { SUMMARY_BYTES } else { 0 };
-            if let Ok((counts, summary)) = device.read(&report.staging, bytes, |it| report.of_bytes(it)) {
-                learn(&report.params, counts, summary);
-            }
+            // A lost device has no report.
+            _ = device.read(&report.staging, bytes, |bytes| {
+                let (counts, summary) = bytes.split_at(Counts::BYTES as usize);
+                let summary = || Summary::of_device(bytemuck::cast_slice(summary), params.boxes);
+                learn(params, bytemuck::pod_read_unaligned(counts), report.has_summary.then(summary));
+            });
         }
     }
 
@@ -88,7 +80,7 @@ impl Reports {
     pub(super) fn record(
         &mut self,
         storage: &Storage,
-        encoder: &mut wgpu::CommandEncoder,
+        encoder: &mut CommandEncoder,
         params: &Params,
         has_summary: bool,
     ) {

@@ -3,7 +3,7 @@
 //! The host cannot know what a call will find. It takes plan and lengths from earlier calls, whose counts come home on their own. A
 //! wrong plan or length costs time, or the call says that it is not complete.
 
-use super::GpuError;
+use super::error::{GpuError, Result};
 use super::forecast::Forecast;
 use super::gpu_device::GpuDevice;
 use super::passes::{self, Groups, Step};
@@ -14,6 +14,7 @@ use crate::layout::{BOX_BYTES, Chunk, Counters, FILTER_BYTES, LANES, PairCount, 
 use pbig_shaders::{self as shaders, Buffer};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
+use wgpu::CommandEncoder;
 
 /// Boxes in a buffer of the caller's device, for [`super::GpuFinder::record_pairs`].
 #[derive(Clone, Copy, Debug)]
@@ -77,9 +78,9 @@ impl Resident {
     /// Records a search. Submits nothing, and waits for nothing.
     pub(super) fn record(
         &mut self,
-        encoder: &mut wgpu::CommandEncoder,
+        encoder: &mut CommandEncoder,
         boxes: &DeviceBoxes<'_>,
-    ) -> Result<DevicePairs, GpuError> {
+    ) -> Result<DevicePairs> {
         self.storage.check_boxes(boxes.count.into())?;
         boxes.lists().try_for_each(check_list)?;
         self.probe(boxes)?;
@@ -88,7 +89,10 @@ impl Resident {
             self.forecast.note_error(error, &mut self.storage);
             self.uniforms = None;
         })?;
-        self.copy_boxes(encoder, boxes);
+        // Copies, as bindings begin at multiples of more than a box.
+        for (to, from, offset, bytes) in boxes.lists().filter(|(.., bytes)| *bytes > 0) {
+            encoder.copy_buffer_to_buffer(from, offset, self.storage.get(to), 0, bytes);
+        }
         let measures = self.forecast.needs_plan(&self.storage.options, params.boxes);
         self.record_steps(encoder, &params, measures);
         self.reports.record(&self.storage, encoder, &params, measures);
@@ -99,7 +103,7 @@ impl Resident {
 
     /// Copies from the caller's buffers in commands that are thrown away: wgpu checks them when they are finished, and an encoder of
     /// the caller is finished where nobody asks what is wrong.
-    fn probe(&mut self, boxes: &DeviceBoxes<'_>) -> Result<(), GpuError> {
+    fn probe(&mut self, boxes: &DeviceBoxes<'_>) -> Result<()> {
         let mut hasher = DefaultHasher::new();
         boxes.lists().for_each(|(_, from, ..)| from.hash(&mut hasher));
         let hash = Some(hasher.finish());
@@ -134,7 +138,7 @@ impl Resident {
     }
 
     /// Makes the buffers of a call, and returns its parameters.
-    fn prepare(&mut self, boxes: &DeviceBoxes<'_>) -> Result<Params, GpuError> {
+    fn prepare(&mut self, boxes: &DeviceBoxes<'_>) -> Result<Params> {
         let (storage, count) = (&mut self.storage, boxes.count);
         let params = self.forecast.params(storage, count, boxes.filters.is_some())?;
         // Kernels bind filters even if there are none.
@@ -148,7 +152,7 @@ impl Resident {
 
     /// Makes the uniforms of a call, unless they are those of the last one. Commands that are recorded read them later, so they never
     /// change.
-    fn set_uniforms(&mut self, params: &Params) -> Result<(), GpuError> {
+    fn set_uniforms(&mut self, params: &Params) -> Result<()> {
         let all = Chunk { small_items: u32::MAX, large_items: u32::MAX, ..Chunk::default() };
         let chunk = self.storage.with_room(all, u64::MAX);
         if self.uniforms != Some((*params, chunk)) {
@@ -159,14 +163,7 @@ impl Resident {
         Ok(())
     }
 
-    /// Copies the boxes, as bindings begin at multiples of more than a box.
-    fn copy_boxes(&self, encoder: &mut wgpu::CommandEncoder, boxes: &DeviceBoxes<'_>) {
-        for (to, from, offset, bytes) in boxes.lists().filter(|(.., bytes)| *bytes > 0) {
-            encoder.copy_buffer_to_buffer(from, offset, self.storage.get(to), 0, bytes);
-        }
-    }
-
-    fn record_steps(&mut self, encoder: &mut wgpu::CommandEncoder, params: &Params, measures: bool) {
+    fn record_steps(&mut self, encoder: &mut CommandEncoder, params: &Params, measures: bool) {
         let mut steps = if params.levels > 0 {
             passes::map_and_check(params)
         } else {
@@ -182,7 +179,7 @@ impl Resident {
 }
 
 /// Returns an error unless a list can be copied.
-fn check_list((list, buffer, offset, bytes): List<'_>) -> Result<(), GpuError> {
+fn check_list((list, buffer, offset, bytes): List<'_>) -> Result<()> {
     let (what, size, usage) = (list.name(), buffer.size(), buffer.usage());
     let fault = if !usage.contains(wgpu::BufferUsages::COPY_SRC) {
         format!("the buffer of {what} has the usage {usage:?}, but it needs COPY_SRC")

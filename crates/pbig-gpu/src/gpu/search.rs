@@ -1,7 +1,7 @@
 //! A search whose boxes come from the host and whose pairs go there. One wait tells the counts, another one brings the pairs, unless they
 //! are few. Lists that did not fit are made longer, and the search is repeated.
 
-use super::GpuError;
+use super::error::{GpuError, Result};
 use super::passes::{self, MOST_RANKED, pair_count};
 use super::reports::Counts;
 use super::session::Session;
@@ -12,7 +12,6 @@ use crate::pbig::Summary;
 use pbig_core::internal::Clock;
 use pbig_core::{Aabb, DeviceFound, Pair, PairList, SearchRequest};
 use pbig_shaders::Buffer;
-use std::ops::Range;
 
 /// Maximum number of repetitions. Each one has the room that the last one asked for.
 const MAX_REPEATS: u32 = 8;
@@ -25,18 +24,18 @@ impl Session {
     pub(super) async fn search(
         &mut self,
         request: &SearchRequest<'_>,
-        mut pairs: PairList,
-    ) -> Result<DeviceFound, GpuError> {
-        pairs.clear();
+        pairs: PairList,
+    ) -> Result<DeviceFound> {
         self.found = DeviceFound::default();
         (self.found.pairs, self.max_pairs, self.submissions) = (pairs, request.max_pairs, 0);
+        self.found.pairs.clear();
         self.timer.iter_mut().for_each(Timer::start);
         let result = self.find(request).await;
         result.inspect_err(|error| self.forecast.note_error(error, &mut self.storage))?;
         Ok(std::mem::take(&mut self.found))
     }
 
-    async fn find(&mut self, request: &SearchRequest<'_>) -> Result<(), GpuError> {
+    async fn find(&mut self, request: &SearchRequest<'_>) -> Result<()> {
         if request.boxes.len() < 2 {
             self.found.valid = count_valid(request.boxes);
             return Ok(());
@@ -51,7 +50,7 @@ impl Session {
     }
 
     /// Uploads all boxes: to find those that moved, the host would have to read a copy of the last call's, too.
-    fn upload(&mut self, request: &SearchRequest<'_>) -> Result<(), GpuError> {
+    fn upload(&mut self, request: &SearchRequest<'_>) -> Result<()> {
         let mut clock = Clock::start();
         self.storage.check_boxes(request.boxes.len() as u64)?;
         self.found.report.uploaded = self.storage.upload(Buffer::Boxes, request.boxes)?
@@ -61,7 +60,7 @@ impl Session {
     }
 
     /// Checks all pairs, again with more room if lists or pairs did not fit. Returns the counts.
-    async fn count(&mut self, request: &SearchRequest<'_>) -> Result<Counts, GpuError> {
+    async fn count(&mut self, request: &SearchRequest<'_>) -> Result<Counts> {
         self.forecast.start();
         let boxes = request.boxes.len() as u32;
         for _ in 0..MAX_REPEATS {
@@ -88,39 +87,36 @@ impl Session {
 
     /// Sorts the boxes into cells, and checks their work items, a chunk in each submission. Returns the counts. The host learns with
     /// them how many chunks there are: before, it submits some more than the last call had.
-    async fn check(&mut self) -> Result<Counts, GpuError> {
-        self.found.report.chunks = 1;
+    async fn check(&mut self) -> Result<Counts> {
         if self.params.levels == 0 {
+            self.found.report.chunks = 1;
             self.submit(Chunk::default(), &passes::check_all(&self.params))?;
             return self.counts().await;
         }
         self.submit(self.chunk(0), &passes::map_and_check(&self.params))?;
         let last = self.chunks(&self.forecast.lists);
-        let submitted = last.saturating_add(last / 4);
-        let counts = self.check_chunks(1..submitted).await?;
-        let (params, counters) = (&self.params, &counts.counters);
-        let chunks = self.chunks(counters);
-        self.found.report.chunks = chunks;
-        let fits = passes::lists_fit(params, counters) && passes::tests_fit(params, counters);
-        if fits && submitted < chunks { self.check_chunks(submitted..chunks).await } else { Ok(counts) }
-    }
-
-    /// Checks chunks of work items. Returns the counts of all so far.
-    async fn check_chunks(&mut self, chunks: Range<u32>) -> Result<Counts, GpuError> {
-        for i in chunks {
-            self.submit(self.chunk(i), &passes::check())?;
+        let mut next = 1..last.saturating_add(last / 4);
+        loop {
+            for i in next.clone() {
+                self.submit(self.chunk(i), &passes::check())?;
+            }
+            let counts = self.counts().await?;
+            let (params, counters) = (&self.params, &counts.counters);
+            let fits = passes::lists_fit(params, counters) && passes::tests_fit(params, counters);
+            next = next.end..self.chunks(counters);
+            self.found.report.chunks = next.end;
+            if !fits || next.is_empty() {
+                return Ok(counts);
+            }
         }
-        self.counts().await
     }
 
-    /// Returns a chunk of the work items.
     fn chunk(&self, i: u32) -> Chunk {
         let [small_items, large_items] = self.chunk_items();
         let [first_small, first_large] = [small_items, large_items].map(|items| i.saturating_mul(items));
         Chunk { first_small, small_items, first_large, large_items, ..Chunk::default() }
     }
 
-    /// Returns the number of chunks of work items.
     fn chunks(&self, lists: &Counters) -> u32 {
         let [small, large] = self.chunk_items();
         lists.small_items.div_ceil(small).max(lists.large_items.div_ceil(large)).max(1)
@@ -136,7 +132,7 @@ impl Session {
     ///
     /// # Errors
     /// If there are more pairs than the caller allows, or if a plan of finer cells makes too many tests, too.
-    fn accepts(&mut self, Counts { counters, totals }: &Counts) -> Result<bool, GpuError> {
+    fn accepts(&mut self, Counts { counters, totals }: &Counts) -> Result<bool> {
         let was_finer = self.forecast.is_finer;
         if !self.forecast.learn(&self.params, counters) {
             let is_hopeless = was_finer && !passes::tests_fit(&self.params, counters);
@@ -188,7 +184,7 @@ impl Session {
     }
 
     /// Takes the pairs of this number of words, in order if the caller wants it and the device can sort so many.
-    async fn take_pairs(&mut self, words: u64, is_sorted: bool) -> Result<(), GpuError> {
+    async fn take_pairs(&mut self, words: u64, is_sorted: bool) -> Result<()> {
         if words <= self.prefetched.len() as u64 {
             let mut pairs: Vec<Pair> = bytemuck::cast_slice(&self.prefetched[..words as usize]).to_vec();
             pairs.sort_unstable();
@@ -203,7 +199,7 @@ impl Session {
     }
 
     /// Sorts the pairs of this number of words, a part of them in each submission. Returns false if there is no room for that.
-    fn sort(&mut self, words: u64) -> Result<bool, GpuError> {
+    fn sort(&mut self, words: u64) -> Result<bool> {
         let pairs = u32::try_from(words / 2).unwrap_or(u32::MAX);
         match passes::make_sort_buffers(&mut self.storage, self.params.boxes, pairs) {
             Err(GpuError::Declined(_)) => return Ok(false),
@@ -226,7 +222,7 @@ impl Session {
     }
 
     /// Makes the buffers through which pairs of this number of bytes come.
-    fn make_staging(&mut self, bytes: u64) -> Result<(), GpuError> {
+    fn make_staging(&mut self, bytes: u64) -> Result<()> {
         let piece = self.piece_bytes();
         self.storage.ensure(BufferId::Staging(0), bytes.min(piece))?;
         let second = bytes.saturating_sub(piece).min(piece);
@@ -234,7 +230,7 @@ impl Session {
     }
 
     /// Reads pairs of this number of words. With pipelining a piece comes while the one before is taken.
-    async fn read_pairs(&mut self, words: u64) -> Result<(), GpuError> {
+    async fn read_pairs(&mut self, words: u64) -> Result<()> {
         let piece = self.piece_bytes();
         let mut next = Some(self.fetch_pairs(0..(4 * words).min(piece), 0)?);
         let mut from = piece;
@@ -249,7 +245,7 @@ impl Session {
     }
 
     /// Copies pairs, and checks them on the way: the output of a device is untrusted input. Threads share the work.
-    fn append(&mut self, pairs: &[Pair]) -> Result<(), GpuError> {
+    fn append(&mut self, pairs: &[Pair]) -> Result<()> {
         let mut clock = Clock::start();
         let boxes = self.params.boxes;
         let fault = |i| GpuError::BadPairs(format!("pair {i} of a piece is not a < b < {boxes}"));

@@ -1,12 +1,13 @@
 //! The state of a finder on a device, and what goes there and comes back.
 
+use super::error::Result;
 use super::forecast::Forecast;
 use super::gpu_device::GpuDevice;
 use super::passes::{self, Step};
 use super::reports::Counts;
 use super::storage::{BufferId, Fetch, Storage};
 use super::timer::Timer;
-use super::{GpuError, wait};
+use super::wait;
 use crate::GpuOptions;
 use crate::layout::{Chunk, Params};
 use pbig_core::DeviceFound;
@@ -51,7 +52,7 @@ impl Session {
     }
 
     /// Records and submits kernels that check these work items. Beyond the limits they count, and write no more.
-    pub(super) fn submit(&mut self, items: Chunk, steps: &[Step]) -> Result<(), GpuError> {
+    pub(super) fn submit(&mut self, items: Chunk, steps: &[Step]) -> Result<()> {
         let mut clock = Clock::start();
         let storage = &mut self.storage;
         let chunk = storage.with_room(items, self.max_pairs);
@@ -66,7 +67,7 @@ impl Session {
     }
 
     /// Waits for the counts of what was submitted, and prefetches the pairs if few are expected.
-    pub(super) async fn counts(&mut self) -> Result<Counts, GpuError> {
+    pub(super) async fn counts(&mut self) -> Result<Counts> {
         let is_short = 4 * self.forecast.words <= PREFETCHED_BYTES && self.found.report.waits == 0;
         let room = PREFETCHED_BYTES.min(self.storage.size(Buffer::Out));
         let pairs = if is_short { room } else { 0 };
@@ -86,7 +87,7 @@ impl Session {
     }
 
     /// Submits the copy of some bytes of pairs to a staging buffer.
-    pub(super) fn fetch_pairs(&mut self, range: Range<u64>, which: usize) -> Result<Fetch, GpuError> {
+    pub(super) fn fetch_pairs(&mut self, range: Range<u64>, which: usize) -> Result<Fetch> {
         let bytes = range.end - range.start;
         self.storage.fetch(BufferId::Staging(which), bytes, |storage, encoder, staging| {
             encoder.copy_buffer_to_buffer(storage.get(Buffer::Out), range.start, staging, 0, bytes);
@@ -94,7 +95,7 @@ impl Session {
     }
 
     /// Takes the times of the call's kernels, if they are wanted.
-    pub(super) async fn take_times(&mut self) -> Result<(), GpuError> {
+    pub(super) async fn take_times(&mut self) -> Result<()> {
         let Some(timer) = &self.timer else { return Ok(()) };
         let copy = |_: &_, encoder: &mut _, staging: &_| timer.resolve(encoder, staging);
         let fetch = self.storage.fetch(BufferId::Staging(0), timer.bytes(), copy)?;
@@ -115,8 +116,8 @@ impl Session {
     pub(super) async fn receive<T>(
         &mut self,
         Fetch { staging, bytes, submission }: Fetch,
-        take: impl FnOnce(&mut Self, &[u8]) -> Result<T, GpuError>,
-    ) -> Result<T, GpuError> {
+        take: impl FnOnce(&mut Self, &[u8]) -> Result<T>,
+    ) -> Result<T> {
         let (mut clock, device) = (Clock::start(), self.storage.device.clone());
         let submissions = std::mem::take(&mut self.submissions).max(1);
         let patience = self.storage.options.patience.saturating_mul(submissions);

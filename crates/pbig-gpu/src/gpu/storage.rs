@@ -1,7 +1,7 @@
 //! The buffers of a finder on the device, and the bind groups made of them. Buffers grow when needed and shrink when they
 //! are hardly used. Each list goes up through a staging buffer, which stays mapped between calls: threads write it there once.
 
-use super::GpuError;
+use super::error::{GpuError, Result};
 use super::gpu_device::{GpuDevice, KernelId, id_of};
 use crate::GpuOptions;
 use crate::layout::{BOX_BYTES, Chunk, halves};
@@ -12,6 +12,7 @@ use pbig_shaders::{Buffer, Kernel};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use wgpu::CommandEncoder;
 
 /// Calls after which a buffer is freed if none of them used a quarter of it.
 const CALLS_PER_WINDOW: u32 = 64;
@@ -24,6 +25,9 @@ const ALWAYS_KEPT_BYTES: u64 = 1 << 16;
 
 /// Bytes that a thread copies at a time: a multiple of [`wgpu::MAP_ALIGNMENT`].
 const PIECE_BYTES: usize = 1 << 19;
+
+/// The limit of one buffer, as errors name it.
+const A_BUFFER: &str = "the device or GpuOptions::max_bytes";
 
 /// A buffer of a finder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -70,7 +74,7 @@ struct KeptBuffer {
     buffer: wgpu::Buffer,
     /// Maximum number of bytes that a call of this window used.
     used: u64,
-    /// The host may write into this staging buffer.
+    /// False while the device has this staging buffer, if the host writes it.
     is_mapped: Arc<AtomicBool>,
 }
 
@@ -81,7 +85,6 @@ pub(super) struct Fetch {
     pub(super) submission: wgpu::SubmissionIndex,
 }
 
-/// The buffers of a finder.
 #[derive(Debug)]
 pub(super) struct Storage {
     pub(super) device: Arc<GpuDevice>,
@@ -114,24 +117,15 @@ impl Storage {
     }
 
     /// Returns an error if so many boxes do not fit every buffer.
-    pub(super) fn check_boxes(&self, boxes: u64) -> Result<(), GpuError> {
-        let fitting = (self.max_buffer_bytes / BOX_BYTES, "the device or GpuOptions::max_bytes");
-        let (most, who) = fitting.min((MAX_BOXES, "pbig"));
-        if boxes <= most {
-            return Ok(());
-        }
-        Err(GpuError::Declined(format!("{boxes} boxes, but {who} allows {most}")))
+    pub(super) fn check_boxes(&self, boxes: u64) -> Result<()> {
+        let limit = (self.max_buffer_bytes / BOX_BYTES, A_BUFFER).min((MAX_BOXES, "pbig"));
+        check(boxes, limit, || format!("{boxes} boxes"))
     }
 
     /// Makes a buffer at least `bytes` long. A buffer that has to grow loses its content.
-    pub(super) fn ensure(&mut self, id: impl Into<BufferId>, bytes: u64) -> Result<(), GpuError> {
-        let (id, limit) = (id.into(), self.max_buffer_bytes);
-        if bytes > limit {
-            let what = id.name();
-            return Err(GpuError::Declined(format!(
-                "the buffer {what} needs {bytes} bytes, but the device or GpuOptions::max_bytes allows {limit}"
-            )));
-        }
+    pub(super) fn ensure(&mut self, id: impl Into<BufferId>, bytes: u64) -> Result<()> {
+        let (id, most) = (id.into(), self.max_buffer_bytes);
+        check(bytes, (most, A_BUFFER), || format!("the buffer {} needs {bytes} bytes", id.name()))?;
         let bytes = bytes.max(MIN_BUFFER_BYTES);
         if let Some(kept) = self.buffers.get_mut(&id).filter(|kept| kept.buffer.size() >= bytes) {
             kept.used = kept.used.max(bytes);
@@ -141,23 +135,14 @@ impl Storage {
         self.buffers.remove(&id);
         self.bind_groups.clear();
         // A quarter more, so that a growing scene does not allocate with every call.
-        let size = (bytes + bytes / 4).min(limit).next_multiple_of(MIN_BUFFER_BYTES);
-        self.check_total(id, size)?;
-        let is_mapped = matches!(id, BufferId::UploadStaging(_));
-        let buffer = self.device.buffer(id.name(), size, id.usage(), is_mapped);
-        self.buffers.insert(id, KeptBuffer { buffer, used: bytes, is_mapped: Arc::new(is_mapped.into()) });
+        let size = (bytes + bytes / 4).min(most).next_multiple_of(MIN_BUFFER_BYTES);
+        let total = self.bytes() + size;
+        check(total, (self.options.max_total_bytes, "GpuOptions::max_total_bytes"), || {
+            format!("with the buffer {} the device's buffers need {total} bytes", id.name())
+        })?;
+        let buffer = self.device.buffer(id.name(), size, id.usage());
+        self.buffers.insert(id, KeptBuffer { buffer, used: bytes, is_mapped: Arc::new(true.into()) });
         Ok(())
-    }
-
-    /// Returns an error if a buffer of this size would exceed the limit of all together.
-    fn check_total(&self, id: BufferId, size: u64) -> Result<(), GpuError> {
-        let (bytes, limit, what) = (self.bytes() + size, self.options.max_total_bytes, id.name());
-        if bytes <= limit {
-            return Ok(());
-        }
-        Err(GpuError::Declined(format!(
-            "with the buffer {what} the device's buffers need {bytes} bytes, but GpuOptions::max_total_bytes allows {limit}"
-        )))
     }
 
     /// Returns a buffer that [`Storage::ensure`] has made.
@@ -177,7 +162,6 @@ impl Storage {
         Chunk { word_capacity: words as u32, pairs_left: halves(max_pairs), ..items }
     }
 
-    /// Frees all buffers.
     pub(super) fn free(&mut self) {
         self.buffers.clear();
         self.bind_groups.clear();
@@ -188,21 +172,20 @@ impl Storage {
     }
 
     /// Writes a few values, such as the parameters of a submission.
-    pub(super) fn write<T: Pod>(&mut self, id: impl Into<BufferId>, data: &[T]) -> Result<(), GpuError> {
-        let id = id.into();
-        self.ensure(id, size_of_val(data) as u64)?;
-        self.device.queue.write_buffer(self.get(id), 0, bytemuck::cast_slice(data));
+    pub(super) fn write<T: Pod>(&mut self, buffer: Buffer, data: &[T]) -> Result<()> {
+        self.ensure(buffer, size_of_val(data) as u64)?;
+        self.device.queue.write_buffer(self.get(buffer), 0, bytemuck::cast_slice(data));
         Ok(())
     }
 
     /// Makes a uniform anew. Commands that were recorded keep the old one.
-    pub(super) fn replace<T: Pod>(&mut self, uniform: Buffer, value: &T) -> Result<(), GpuError> {
+    pub(super) fn replace<T: Pod>(&mut self, uniform: Buffer, value: &T) -> Result<()> {
         self.buffers.remove(&uniform.into());
         self.write(uniform, &[*value])
     }
 
     /// Makes the buffer of a list, and sends the list. Returns its bytes.
-    pub(super) fn upload<T: Pod>(&mut self, buffer: Buffer, list: &[T]) -> Result<u64, GpuError> {
+    pub(super) fn upload<T: Pod>(&mut self, buffer: Buffer, list: &[T]) -> Result<u64> {
         let list: &[u8] = bytemuck::cast_slice(list);
         let bytes = list.len() as u64;
         // Kernels bind it even if it is empty.
@@ -223,7 +206,7 @@ impl Storage {
     }
 
     /// Writes a list into its staging buffer: each thread writes pieces of it straight into mapped memory.
-    fn stage(&mut self, id: BufferId, list: &[u8]) -> Result<(), GpuError> {
+    fn stage(&mut self, id: BufferId, list: &[u8]) -> Result<()> {
         // A call that failed has left the buffer to the device.
         if self.buffers.get(&id).is_some_and(|kept| !kept.is_mapped.load(Ordering::Acquire)) {
             self.buffers.remove(&id);
@@ -252,8 +235,8 @@ impl Storage {
         &mut self,
         staging: BufferId,
         bytes: u64,
-        copy: impl FnOnce(&Self, &mut wgpu::CommandEncoder, &wgpu::Buffer),
-    ) -> Result<Fetch, GpuError> {
+        copy: impl FnOnce(&Self, &mut CommandEncoder, &wgpu::Buffer),
+    ) -> Result<Fetch> {
         self.ensure(staging, bytes)?;
         let (staging, mut encoder) = (self.get(staging).clone(), self.device.encoder());
         copy(self, &mut encoder, &staging);
@@ -262,7 +245,7 @@ impl Storage {
 
     pub(super) fn bind_group(
         &mut self,
-        kernel: &'static Kernel,
+        kernel: &Kernel,
         pipeline: &wgpu::ComputePipeline,
     ) -> wgpu::BindGroup {
         if let Some(known) = self.bind_groups.get(&id_of(kernel)) {
@@ -290,5 +273,14 @@ impl Storage {
         self.buffers.retain(|_, kept| kept.buffer.size() <= (4 * kept.used).max(ALWAYS_KEPT_BYTES));
         self.buffers.values_mut().for_each(|kept| kept.used = 0);
         self.bind_groups.clear();
+    }
+}
+
+/// Returns an error if what is needed exceeds a limit, which has a name.
+fn check(needed: u64, (most, limit): (u64, &str), what: impl FnOnce() -> String) -> Result<()> {
+    if needed <= most {
+        Ok(())
+    } else {
+        Err(GpuError::Declined(format!("{}, but {limit} allows {most}", what())))
     }
 }

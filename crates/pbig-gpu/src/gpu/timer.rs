@@ -4,6 +4,7 @@ use super::gpu_device::GpuDevice;
 use crate::GpuOptions;
 use pbig_shaders::Kernel;
 use std::time::Duration;
+use wgpu::CommandEncoder;
 
 /// Maximum number of kernels of a call that are timed: each takes two timestamps, and no query set of WebGPU holds more.
 const MOST_TIMED: u32 = wgpu::QUERY_SET_MAX_QUERIES / 2;
@@ -25,7 +26,7 @@ impl Timer {
         let (label, ty, count) = (Some("times"), wgpu::QueryType::Timestamp, 2 * MOST_TIMED);
         let queries = device.handle.create_query_set(&wgpu::QuerySetDescriptor { label, ty, count });
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
-        let resolved = device.buffer("times", u64::from(count) * 8, usage, false);
+        let resolved = device.buffer("times", u64::from(count) * 8, usage);
         Some(Self { queries, resolved, kernels: Vec::new() })
     }
 
@@ -46,12 +47,11 @@ impl Timer {
     }
 
     /// Records the copy of the timestamps into a staging buffer.
-    pub(super) fn resolve(&self, encoder: &mut wgpu::CommandEncoder, staging: &wgpu::Buffer) {
+    pub(super) fn resolve(&self, encoder: &mut CommandEncoder, staging: &wgpu::Buffer) {
         encoder.resolve_query_set(&self.queries, 0..2 * self.kernels.len() as u32, &self.resolved, 0);
         encoder.copy_buffer_to_buffer(&self.resolved, 0, staging, 0, self.bytes());
     }
 
-    /// Returns the bytes of the call's timestamps.
     pub(super) fn bytes(&self) -> u64 {
         16 * self.kernels.len() as u64
     }

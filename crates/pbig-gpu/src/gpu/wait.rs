@@ -1,13 +1,13 @@
 //! Waiting for the device in a program: the thread blocks, so futures here are ready at once.
 
-use super::GpuError;
+use super::error::{GpuError, Result};
 use super::gpu_device::{GpuDevice, lock};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
 use std::time::Duration;
 
 /// Blocks until a future is done.
-pub(super) fn block_on<T>(future: impl Future<Output = Result<T, GpuError>>) -> Result<T, GpuError> {
+pub(super) fn block_on<T>(future: impl Future<Output = Result<T>>) -> Result<T> {
     pollster::block_on(future)
 }
 
@@ -18,7 +18,7 @@ pub(super) async fn map(
     bytes: u64,
     submission: wgpu::SubmissionIndex,
     patience: Duration,
-) -> Result<(), GpuError> {
+) -> Result<()> {
     let (sender, mapped) = mpsc::channel();
     staging.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
         // The receiver is gone if the wait was given up.
@@ -54,7 +54,7 @@ impl GpuDevice {
     }
 
     /// Waits for a submission, at most for `patience`.
-    fn wait(&self, submission: wgpu::SubmissionIndex, patience: Duration) -> Result<(), GpuError> {
+    fn wait(&self, submission: wgpu::SubmissionIndex, patience: Duration) -> Result<()> {
         match self.poll(wait_for(submission, patience)) {
             Ok(()) => Ok(()),
             Err(Some(wgpu::PollError::Timeout)) => {

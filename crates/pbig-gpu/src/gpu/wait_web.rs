@@ -1,6 +1,6 @@
 //! Waiting for the device in a page, where nothing may block: the browser calls back.
 
-use super::GpuError;
+use super::error::{GpuError, Result};
 use super::gpu_device::{GpuDevice, lock};
 use std::future::poll_fn;
 use std::sync::{Arc, Mutex};
@@ -8,7 +8,7 @@ use std::task::{Poll, Waker};
 use std::time::Duration;
 
 /// Returns an error: a page may not block.
-pub(super) fn block_on<T>(_: impl Future<Output = Result<T, GpuError>>) -> Result<T, GpuError> {
+pub(super) fn block_on<T>(_: impl Future<Output = Result<T>>) -> Result<T> {
     Err(GpuError::WouldBlock)
 }
 
@@ -22,7 +22,7 @@ pub(super) async fn map(
     bytes: u64,
     _: wgpu::SubmissionIndex,
     _: Duration,
-) -> Result<(), GpuError> {
+) -> Result<()> {
     let mapping = Arc::new(Mutex::new(Mapping::default()));
     let told = mapping.clone();
     staging.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {

@@ -1,14 +1,12 @@
 //! Errors that wgpu reports while a call is in progress.
 
+use super::error::{GpuError, Result};
 use super::gpu_device::{GpuDevice, lock};
-use super::{GpuError, wait};
+use super::wait;
 
 impl GpuDevice {
     /// Runs `work`, and returns errors that wgpu reports meanwhile.
-    pub(super) async fn watch<T>(
-        &self,
-        work: impl AsyncFnOnce() -> Result<T, GpuError>,
-    ) -> Result<T, GpuError> {
+    pub(super) async fn watch<T>(&self, work: impl AsyncFnOnce() -> Result<T>) -> Result<T> {
         use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
         // The calls of a page share one stack of error scopes. Each thread of a program has its own.
         #[cfg(target_arch = "wasm32")]
@@ -36,7 +34,7 @@ impl GpuDevice {
     }
 
     /// Runs `work`, and returns errors that wgpu reports meanwhile. A page is told of them by its browser: it cannot wait for them.
-    pub(super) fn watch_now<T>(&self, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
+    pub(super) fn watch_now<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
         if cfg!(target_arch = "wasm32") { work() } else { wait::block_on(self.watch(async || work())) }
     }
 }
