@@ -153,12 +153,27 @@ check_other() {
     fail "$other; the patch is for $version (bevy_rapier 0.37): change the version in your manifest$cure"
 }
 
+# is_wanted CRATE: returns 1 if manifests ask for the crate, and none for the patch's version; sets `other` to what one asks for.
+is_wanted() {
+    local use manifest asked=
+    while IFS=$'\t' read -r use manifest; do
+        case ${use%% *} in "$1" | "bevy_$1") ;; *) continue ;; esac
+        ! takes_patch "${use%% *}" "${use#* }" || return 0
+        asked="$manifest asks for $use"
+    done <<<"$uses"
+    [ -n "$asked" ] || return 0
+    other=$asked
+    return 1
+}
+
 # find_crates: sets `crates` to the crates of rapier that the project has at the patch's version, in Cargo.lock or else in manifests.
 find_crates() {
     local crate use manifest
     for crate in rapier2d rapier2d-f64 rapier3d rapier3d-f64; do
         ! is_locked $crate || crates+=" $crate"
     done
+    # A manifest may have moved to another version since Cargo.lock was written.
+    for crate in $crates; do is_wanted "$crate" || check_other; done
     [ -z "$crates" ] || return 0
     check_other
     [ -n "$about" ] || fail "mend the manifest, or name rapier's crate by --crate: $(read_manifests 2>&1 || true)"

@@ -138,6 +138,11 @@ fn another_version_of_rapier_is_refused_and_so_is_none() {
         uses(line);
         project.fails_with(words, &[]);
     }
+    // Cargo.lock still has what an earlier manifest asked for.
+    uses("rapier3d = \"0.35\"");
+    project.write("Cargo.lock", &locked("0.36.1"));
+    project.fails_with("Cargo.toml asks for rapier3d ^0.35; the patch is for 0.36.1", &[]);
+    fs::remove_file(project.folder().join("Cargo.lock")).expect("removed");
     for line in [
         "rapier3d = \"0.36.1\"",
         "rapier3d = \"=0.36\"",

@@ -32,7 +32,7 @@ pub(super) fn resolved(s: &State) -> Vec<(Vec<Slot>, u32, u32)> {
 
 /// Compares summaries. A device may take denormal extents for 0, as SwiftShader does: extents decide only the cells.
 pub(super) fn compare_summaries(_: &State, found: &State, wanted: &State) -> Option<String> {
-    let is_extent = |i: usize| i % 4 > 0 && i < CLASS_WORDS as usize;
+    let is_extent = |i: usize| !i.is_multiple_of(4) && i < CLASS_WORDS as usize;
     let flush = |(i, &word): (usize, &u32)| {
         if is_extent(i) && word < f32::MIN_POSITIVE.to_bits() { 0 } else { word }
     };
