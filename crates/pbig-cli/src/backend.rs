@@ -1,8 +1,8 @@
 //! Options that choose the backend and its adapter, and what a run on a GPU owes its user.
 
 use pbig_core::{BroadPhase, Config, Finder, PairDevice};
-use pbig_gpu::{DECLINED, GpuFinder, GpuOptions};
-use pbig_harness::options::{BackendOption, shared_gpu};
+use pbig_gpu::{DECLINED, GpuFinder};
+use pbig_harness::options::BackendOption;
 use pbig_harness::output::{Failure, warn};
 use rapier_pbig::PbigBroadPhase;
 
@@ -49,17 +49,23 @@ impl BackendArgs {
     /// Returns the device to search on, if one is asked for.
     fn device(&self) -> Result<Option<Box<dyn PairDevice>>, Failure> {
         self.check_options()?;
-        let device = match &self.adapter {
-            None => shared_gpu(self.kind.backend(), GpuOptions::DEFAULT),
-            Some(name) => {
-                let gpu = pbig_gpu::adapter(Some(name)).and_then(|adapter| GpuFinder::on(&adapter));
-                let gpu = gpu.map_err(|error| Failure::Input(format!("--adapter {name}: {error}")))?;
-                Some(Box::new(gpu) as Box<dyn PairDevice>)
-            }
+        if self.kind != BackendOption::Gpu {
+            return Ok(None);
+        }
+        let gpu = self.gpu()?;
+        self.check_adapter(gpu.adapter())?;
+        Ok(Some(Box::new(gpu)))
+    }
+
+    fn gpu(&self) -> Result<GpuFinder, Failure> {
+        let Some(name) = &self.adapter else {
+            let mut gpu = GpuFinder::shared();
+            // It opens the adapter. Why that fails is told after the search.
+            _ = gpu.prepare();
+            return Ok(gpu);
         };
-        let name = device.as_ref().and_then(|device| device.name());
-        name.map_or(Ok(()), |name| self.check_adapter(name))?;
-        Ok(device)
+        let gpu = pbig_gpu::adapter(Some(name)).and_then(|adapter| GpuFinder::on(&adapter));
+        gpu.map_err(|error| Failure::Input(format!("--adapter {name}: {error}")))
     }
 
     /// Warns of a software adapter, or refuses it, before its long work.

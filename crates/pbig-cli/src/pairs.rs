@@ -26,14 +26,14 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["input", "with"], requires = "elements")]
     mesh: Option<PathBuf>,
     /// The mesh a step later: boxes hold each element on its way there.
-    #[arg(long, value_name = "FRAME", requires = "mesh")]
+    // Without the conflict `requires` has no effect beside INPUT, which a mesh cannot have.
+    #[arg(long, value_name = "FRAME", requires = "mesh", conflicts_with = "input")]
     pub(crate) next: Option<PathBuf>,
     /// Pairs of elements: ee, vf or any two of v (vertex), e (edge) and f (face), with commas.
-    // With INPUT a mesh is not required: it would conflict.
     #[arg(long, value_name = "KINDS", value_parser = kinds, value_delimiter = ',', requires = "mesh", conflicts_with = "input")]
     pub(crate) elements: Vec<Kinds>,
     /// File for the vertices of each edge: .npy (E,2) uint32 or .csv; row `i` has those of the edge `i`.
-    #[arg(long, value_name = "TABLE", requires = "mesh")]
+    #[arg(long, value_name = "TABLE", requires = "mesh", conflicts_with = "input")]
     pub(crate) edges: Option<PathBuf>,
     /// Distance by which every box grows on all sides, rounded outward: half a thickness.
     #[arg(long, value_name = "M", default_value = "0", value_parser = thickness, allow_negative_numbers = true)]

@@ -82,7 +82,10 @@ fn a_table_of_edges_is_refused_where_it_cannot_be_written() {
     refused(&mesh(&["ee", "-o", "-", "--edges", "-"]), &[&format!("-: {same}")]);
     std::fs::hard_link(here.join("m.obj"), here.join("link.csv")).expect("a link");
     refused(&mesh(&["ee", "--edges", "link.csv"]), &["link.csv: --edges names the input, m.obj"]);
-    refused(&pbig(here, &["pairs", "a.csv", "--edges", "e.csv"]), &["--mesh"]);
+    refused(
+        &pbig(here, &["pairs", "a.csv", "--edges", "e.csv"]),
+        &["'[INPUT]' cannot be used with '--edges"],
+    );
     let output = mesh(&["ee", "--edges", "-"]);
     assert_eq!(String::from_utf8_lossy(&output.stdout), "a,b\n0,1\n0,2\n1,2\n3,4\n3,5\n4,5\n");
     assert!(String::from_utf8_lossy(&output.stderr).starts_with("6 vertices, 6 edges (0 rods), 2 faces\n"));

@@ -55,7 +55,11 @@ fn every_error_names_the_help_and_guesses_nothing() {
         (&["--jsn", "pairs"], "unexpected argument '--jsn' found (see pbig --help)"),
         (
             &["pairs", "x.npy", "--elements", "ee"],
-            "the argument '--elements <KINDS>' cannot be used with '[INPUT]' (see pbig pairs --help)",
+            "the argument '[INPUT]' cannot be used with '--elements <KINDS>' (see pbig pairs --help)",
+        ),
+        (
+            &["pairs", "x.npy", "--next", "y.obj"],
+            "the argument '[INPUT]' cannot be used with '--next <FRAME>' (see pbig pairs --help)",
         ),
         (&["pairs"], "the following required arguments were not provided: <INPUT> (see pbig pairs --help)"),
     ] {

@@ -154,14 +154,14 @@ fn wrong_throughout(line: &str, is_first: bool) -> Option<String> {
             return Some(format!("values are separated by {name}; expected commas"));
         }
     }
-    if fields(line).count() == 1 && line.split_whitespace().count() > 1 {
-        return Some(
-            "values are separated by spaces; expected commas: numpy.savetxt takes delimiter=','".into(),
-        );
-    }
     let is_name = |field: &str| field.starts_with(|c: char| c.is_alphabetic() || c == '#');
     let is_other_header = is_first && fields(line).all(is_name);
-    is_other_header.then(|| format!("the header must be {}, or be left out", COLUMNS.join(",")))
+    if is_other_header {
+        return Some(format!("the header must be {}, or be left out", COLUMNS.join(",")));
+    }
+    let has_spaces = fields(line).count() == 1 && line.split_whitespace().count() > 1;
+    has_spaces
+        .then(|| "values are separated by spaces; expected commas: numpy.savetxt takes delimiter=','".into())
 }
 
 fn csv_box(line: &str, is_first: bool) -> Result<Aabb, String> {
