@@ -64,7 +64,7 @@ fn sides(faces: &[Keys]) -> impl Iterator<Item = [u32; 2]> {
 pub(crate) struct Mesh<'a> {
     vertices: Vec<Aabb>,
     faces: &'a [Keys],
-    /// Those of the faces if there are none.
+    /// The caller's edges. Without them the sides of the faces are the edges.
     edges: Option<&'a [[u32; 2]]>,
 }
 

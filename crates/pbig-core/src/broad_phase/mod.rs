@@ -147,8 +147,7 @@ impl BroadPhase {
     /// or more, and over 64 times [`BroadPhase::id_count`].
     #[inline(always)]
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
-        let margin = self.config.margin;
-        let is_set = self.world.set(id, aabb, filter, margin);
+        let is_set = self.world.set(id, aabb, filter, self.config.margin);
         if is_set { Ok(()) } else { self.insert(id, aabb, filter) }
     }
 
@@ -214,8 +213,7 @@ impl BroadPhase {
     /// Moves a box that keeps its filter. Returns false when there is none.
     #[inline(always)]
     pub fn set_aabb(&mut self, id: u32, aabb: Aabb) -> bool {
-        let margin = self.config.margin;
-        self.world.set_aabb(id, aabb, margin)
+        self.world.set_aabb(id, aabb, self.config.margin)
     }
 
     #[cold]

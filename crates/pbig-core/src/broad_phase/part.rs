@@ -14,7 +14,7 @@ pub(super) mod state {
     pub(in crate::broad_phase) const CHANGED: u8 = 4;
 }
 
-/// A list of ids that have changed.
+/// A list of ids that have changed: one that grows, or the room that a thread was given, so that it asks for no memory.
 pub(super) trait List {
     fn add(&mut self, id: u32);
 }
@@ -26,7 +26,7 @@ impl List for &mut Vec<u32> {
     }
 }
 
-/// Room for the ids of a piece.
+/// Room for all ids of a piece, and how many of them are listed there.
 pub(super) struct Room<'a> {
     pub(super) room: &'a mut [u32],
     pub(super) listed: &'a mut usize,
