@@ -36,8 +36,8 @@ pub(crate) const MIN_CELLS: f64 = 4096.0;
 /// Maximum mean number of boxes in a cell for a search to visit all of the five runs of the half neighbourhood.
 pub(crate) const RUNS_UP_TO_PER_CELL: f64 = 3.0;
 
-/// Maximum mean number of boxes of both sets in a cell of 64 steps, for their cells to have 128, if the sample sees
-/// no crowd. A search of sparse sets took half as long, because windows have fewer rows. One of dense sets would test two to three times
+/// Maximum mean number of boxes of both sets in a cell of 64 steps (see `search/grid/cells.rs`), for their cells to have 128, if the sample
+/// tells of no other boxes in a box's cell. A search of sparse sets took half as long, because windows have fewer rows. One of dense sets would test two to three times
 /// as many boxes.
 pub(crate) const LONG_CELLS_UP_TO_PER_CELL: f64 = 1.0;
 

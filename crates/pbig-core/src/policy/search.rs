@@ -5,7 +5,7 @@
 /// Work of a look at a row of cells: 11 ns.
 pub(crate) const WORK_OF_ROW: u64 = 32;
 
-/// Work of a look at the few rows of cells that boxes as small as a cell have.
+/// Work, for a box, of a look at all of its five runs, which is all that boxes as small as a cell need.
 pub(crate) const WORK_OF_RUNS: u64 = 16;
 
 /// Work of an exact test of two boxes that lie one after the other in memory.
