@@ -7,7 +7,11 @@ set -uo pipefail
 cd "$(dirname "$0")/.."
 
 runs=true
-[ "${1:-}" = --no-run ] && runs=false
+case ${1:-} in
+'') ;;
+--no-run) runs=false ;;
+*) sed -n '2,5s/^# \{0,1\}//p' "$0" && exit $([ "$1" = --help ] && echo 0 || echo 2) ;;
+esac
 seconds=${DOCS_SECONDS:-300}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

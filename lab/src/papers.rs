@@ -33,14 +33,14 @@ pub fn run(quick: bool) -> Result<BenchReport, Failure> {
         tables.extend(part(&setup)?);
     }
     tables.push(figures::sizes());
-    let gpu = if setup.is_software() { "pbig, software adapter" } else { "pbig, GPU" };
-    let charts = charts(&tables, gpu);
+    let charts = charts(&tables, setup.is_software());
     let head = vec![("software", setup.is_software().to_string()), ("adapter", setup.adapter)];
     Ok(BenchReport { head, charts, ..BenchReport::new("papers", tables) })
 }
 
-/// Draws PBIG's figures 8 and 9 and Avril's figure 5, with the line of a device under the given name.
-fn charts(tables: &[Table], gpu: &str) -> Vec<Chart> {
+/// Draws PBIG's figures 8 and 9 and Avril's figure 5. Times of a software adapter say nothing about a GPU, so it has no line.
+fn charts(tables: &[Table], is_software: bool) -> Vec<Chart> {
+    let gpu = "pbig, GPU";
     let table = |start: &str| tables.iter().find(|table| table.name.starts_with(start)).expect("made before");
     let (uniform, cells, steps) = (table("PBIG figure 8"), table("PBIG figure 9"), table("Avril table 6"));
     let of_uniform = [
@@ -48,7 +48,7 @@ fn charts(tables: &[Table], gpu: &str) -> Vec<Chart> {
         ("PBIG's grid, CPU, one thread", "ms, PBIG's grid, CPU, one thread"),
         (gpu, "ms, GPU"),
     ];
-    let of_uniform = of_uniform.map(|(name, y)| uniform.line(name, ["boxes", y], |_| true));
+    let of_uniform = of_uniform.map(|(name, y)| uniform.line(name, ["boxes", y], |_| name != gpu || !is_software));
     let mut sizes: Vec<_> = cells.column("boxes").collect();
     sizes.dedup();
     let of_size = |size: &Value| {
@@ -58,8 +58,9 @@ fn charts(tables: &[Table], gpu: &str) -> Vec<Chart> {
         line
     };
     let of_steps = [("printed", "printed"), ("pbig, CPU", "ours, CPU"), (gpu, "ours, GPU")];
+    let is_drawn = |row: &[Value], side: &str| row[1] == side && !(is_software && side == "ours, GPU");
     let of_steps =
-        of_steps.map(|(name, side)| steps.line(name, ["objects", "whole, ms"], |row| row[1] == side));
+        of_steps.map(|(name, side)| steps.line(name, ["objects", "whole, ms"], |row| is_drawn(row, side)));
     let of_cells = sizes.into_iter().map(of_size).collect();
     let chart = |name, title, x, lines| Chart::log(name, title, [x, "time, ms"], lines);
     vec![

@@ -77,10 +77,10 @@ pub struct HudSide<'a> {
     pub title: String,
 }
 
-/// The height of a comparison's text line, as a share of the picture's height.
-const COMPARISON_TEXT_SHARE: f32 = 0.038;
+/// The height of a comparison's text line, as a share of the picture's height: ten pixels where a phone shows the picture.
+const COMPARISON_TEXT_SHARE: f32 = 0.054;
 
-/// Lays out one half of a comparison: the broad phase's name, its times, the median one in large letters, and the graph.
+/// Lays out one half of a comparison: the broad phase's name, its median time, and the graph.
 /// `size` is the half's, in pixels.
 pub fn comparison(side: &HudSide<'_>, size: [f32; 2]) -> Sheet {
     let mut sheet = Sheet::default();
@@ -97,17 +97,14 @@ pub fn comparison(side: &HudSide<'_>, size: [f32; 2]) -> Sheet {
 fn add_times(sheet: &mut Sheet, side: &HudSide<'_>, width: f32, text: f32) {
     let colour = colour_of(side.choice);
     let name = if side.choice == Choice::Stock { "rapier's own broad phase" } else { "pbig" };
-    let broad_phase = side.history.summary(|step| step.broad_phase_ms);
-    let step = side.history.summary(|step| step.step_ms);
     sheet.panel(Area { x: 0.0, y: 0.0, width, height: 3.3 * text }, PAPER);
-    sheet.text(name, [0.5 * text, 0.2 * text], 1.35 * text, colour);
-    // Medians, because another program that takes the processor for a while changes a mean.
-    let median = format!("{:.2} ms", broad_phase.median);
-    let from_right = (median.chars().count() as f32 * 0.55 + 0.2) * 2.1 * text;
-    sheet.text(median, [width - from_right, 0.05 * text], 2.1 * text, colour);
-    sheet.text("broad phase, median", [width - from_right, 2.2 * text], 0.75 * text, INK);
-    let rest = format!("p99 {:.1} ms, whole step {:.1} ms", broad_phase.p99, step.median);
-    sheet.text(rest, [0.5 * text, 1.85 * text], text, INK);
+    sheet.text(name, [0.5 * text, 0.15 * text], 1.2 * text, colour);
+    // A median, because another program that takes the processor for a while changes a mean.
+    let median = format!("{:.2} ms", side.history.summary(|step| step.broad_phase_ms).median);
+    let large = 1.7 * text;
+    let behind = (median.chars().count() as f32 * 0.6) * large + 0.8 * text;
+    sheet.text(median, [0.5 * text, 1.4 * text], large, colour);
+    sheet.text("median of a step", [behind, 2.1 * text], 0.95 * text, INK);
 }
 
 #[cfg(test)]

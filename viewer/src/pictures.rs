@@ -96,8 +96,7 @@ impl Studio {
         }
         let longest =
             self.sides.iter().map(|(side, _)| side.history.longest_broad_phase_ms()).fold(0.0, f64::max);
-        let (bodies, steps) = (simulation.world.bodies.len(), simulation.steps);
-        let title = format!("{} objects, step {steps}: broad phase, ms a step", thousands(bodies));
+        let title = format!("step {}: broad phase, ms a step", simulation.steps);
         let (choice, history) = (simulation.choice, &simulation.history);
         hud::comparison(&HudSide { choice, history, end_ms: scale_end_ms(longest), title }, size)
     }
@@ -109,13 +108,6 @@ fn step_all<'a>(mut simulations: impl Iterator<Item = &'a mut Simulation>) -> Re
         simulation.step();
         simulation.check()
     })
-}
-
-/// Returns a number with a comma before each three digits.
-fn thousands(number: usize) -> String {
-    let digits = number.to_string();
-    let groups = digits.as_bytes().rchunks(3).rev().map(String::from_utf8_lossy);
-    groups.collect::<Vec<_>>().join(",")
 }
 
 /// Returns the choice for the right side of a comparison, which is not stock.
@@ -141,11 +133,6 @@ mod tests {
     use crate::simulation::{Setting, with_max_pairs};
     use image::Rgb;
     use pbig_scenes::scenes::Scene;
-
-    #[test]
-    fn numbers_have_a_comma_before_each_three_digits() {
-        assert_eq!([0, 999, 1000, 1234567].map(thousands), ["0", "999", "1,000", "1,234,567"]);
-    }
 
     #[test]
     fn a_step_fails_with_the_broad_phase_of_either_side() {

@@ -1,7 +1,5 @@
 //! Writes frames of boxes into a file for `pbig replay`.
 
-use ndarray::Array3;
-use ndarray_npy::{WriteNpyError, WriteNpyExt};
 use pbig_core::Aabb;
 use std::collections::VecDeque;
 use std::fs::File;
@@ -16,7 +14,7 @@ pub struct ReplayError {
     /// The file.
     pub file: PathBuf,
     /// The cause.
-    pub cause: WriteNpyError,
+    pub cause: std::io::Error,
 }
 
 /// Writes frames as `.npy` (F,N,6) float32, as `pbig replay` reads them. Boxes that a frame lacks are NaN.
@@ -29,16 +27,25 @@ pub fn write_frames<'a>(
 ) -> Result<(), ReplayError> {
     let frames: Vec<&Vec<Aabb>> = frames.into_iter().collect();
     let boxes = frames.iter().map(|frame| frame.len()).max().unwrap_or(0);
-    let array = Array3::from_shape_fn((frames.len(), boxes, 6), |(f, i, k)| {
-        let aabb = frames[f].get(i).unwrap_or(&Aabb::NOWHERE);
-        if k < 3 { aabb.min[k] } else { aabb.max[k - 3] }
-    });
-    let write = || -> Result<(), WriteNpyError> {
+    let write = || {
         let mut out = BufWriter::new(File::create(file)?);
-        array.write_npy(&mut out)?;
-        Ok(out.flush()?)
+        out.write_all(&head(frames.len(), boxes))?;
+        for (frame, i) in frames.iter().flat_map(|frame| (0..boxes).map(move |i| (frame, i))) {
+            let aabb = frame.get(i).unwrap_or(&Aabb::NOWHERE);
+            out.write_all(aabb.min.map(f32::to_le_bytes).as_flattened())?;
+            out.write_all(aabb.max.map(f32::to_le_bytes).as_flattened())?;
+        }
+        out.flush()
     };
     write().map_err(|cause| ReplayError { file: file.into(), cause })
+}
+
+/// Returns the head of an `.npy` file of version 1.0: 128 bytes. A crate for it would bring twenty to every app that checks.
+fn head(frames: usize, boxes: usize) -> Vec<u8> {
+    let shape = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({frames}, {boxes}, 6), }}");
+    let mut head = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    head.extend(format!("{shape:<117}\n").bytes());
+    head
 }
 
 /// Writes a new file into `folder`. Its name has the time and the process, so that no two runs write the same file.
