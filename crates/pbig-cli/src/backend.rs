@@ -11,7 +11,7 @@ pub(crate) struct BackendArgs {
     /// The backend that searches.
     #[arg(long = "backend", value_enum, default_value_t)]
     kind: BackendOption,
-    /// With `--backend gpu`: the adapter, by a part of its name in any case. Without it WGPU_ADAPTER_NAME chooses, or the best is taken.
+    /// With `--backend gpu`: the adapter, by a part of its name in any case, or by its number in `pbig doctor`. Without it WGPU_ADAPTER_NAME chooses, or the best is taken.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// With `--backend gpu`: status 1, without output, unless a GPU does all the work. A software adapter is not a GPU.
@@ -20,7 +20,11 @@ pub(crate) struct BackendArgs {
 }
 
 impl BackendArgs {
-    pub(crate) fn finder(&self) -> Result<Finder, Failure> {
+    /// Returns a finder for one set of boxes. All other searches run on the CPU.
+    pub(crate) fn finder(&self, has_one_set: bool) -> Result<Finder, Failure> {
+        if self.kind == BackendOption::Gpu && self.require_gpu && !has_one_set {
+            return Err(required("a search with --with or --mesh runs on the CPU"));
+        }
         let config = Config { backend: self.kind.backend(), ..Config::DEFAULT };
         Ok(match self.device()? {
             Some(device) => Finder::with_device(config, device),
@@ -57,15 +61,19 @@ impl BackendArgs {
         Ok(Some(Box::new(gpu)))
     }
 
+    /// Opens the adapter. If a GPU is required, fails before the search.
     fn gpu(&self) -> Result<GpuFinder, Failure> {
-        let Some(name) = &self.adapter else {
-            let mut gpu = GpuFinder::shared();
-            // It opens the adapter. Why that fails is told after the search.
-            _ = gpu.prepare();
-            return Ok(gpu);
+        let mut gpu = match &self.adapter {
+            Some(name) => pbig_gpu::adapter(Some(name))
+                .and_then(|adapter| GpuFinder::on(&adapter))
+                .map_err(|error| Failure::Input(format!("--adapter {name}: {error}")))?,
+            None => GpuFinder::shared(),
         };
-        let gpu = pbig_gpu::adapter(Some(name)).and_then(|adapter| GpuFinder::on(&adapter));
-        gpu.map_err(|error| Failure::Input(format!("--adapter {name}: {error}")))
+        match gpu.prepare() {
+            Err(why) if self.require_gpu => Err(required(&why.to_string())),
+            // The report of the search has the reason of a failure.
+            _ => Ok(gpu),
+        }
     }
 
     /// Warns of a software adapter, or refuses it, before its long work.
@@ -74,7 +82,7 @@ impl BackendArgs {
             return Ok(());
         }
         if self.require_gpu {
-            return Err(Failure::Check(format!("--require-gpu: {name} is a software adapter")));
+            return Err(required(&format!("{name} is a software adapter")));
         }
         warn(&format!(
             "{name} is a program on the CPU, slower than --backend cpu; `pbig doctor` says why no GPU is found"
@@ -101,13 +109,18 @@ impl BackendArgs {
     /// Warns of work that no GPU did. If a GPU is required and did not do all the work, fails with the reason.
     pub(crate) fn check_use(&self, adapter: Option<&str>, fallback: Option<&str>) -> Result<(), Failure> {
         if let (true, Some(why)) = (self.require_gpu, no_gpu(adapter, fallback)) {
-            return Err(Failure::Check(format!("--require-gpu: {why}")));
+            return Err(required(&why));
         }
         if let Some(why) = fallback {
             warn(&format!("{}; `pbig doctor` says more", plain(why)));
         }
         Ok(())
     }
+}
+
+/// Returns the failure of `--require-gpu` for this reason.
+fn required(why: &str) -> Failure {
+    Failure::Check(format!("--require-gpu: {why}"))
 }
 
 /// Returns the reason why the work was not all done by a GPU.
@@ -131,7 +144,7 @@ fn plain(why: &str) -> String {
 }
 
 /// Returns true for a description of a software adapter, such as `llvmpipe (LLVM 15) (software, vulkan)`.
-fn is_software(adapter: &str) -> bool {
+pub(crate) fn is_software(adapter: &str) -> bool {
     adapter.rsplit_once(" (").is_some_and(|(_, kind)| kind.starts_with("software, "))
 }
 

@@ -7,7 +7,7 @@ use pbig_harness::report::simd_found;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The adapter that `--backend gpu` uses, by a part of its name, as in `pbig pairs --adapter NAME`.
+    /// The adapter that `--backend gpu` uses, by its number here or a part of its name, as in `pbig pairs --adapter NAME`.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Print one JSON object.

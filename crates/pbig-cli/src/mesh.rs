@@ -136,7 +136,7 @@ fn for_kinds(output: &Path, Kinds(kinds): &Kinds) -> PathBuf {
 }
 
 fn find(args: &Args, path: &Path, kinds: &Kinds, elements: &MeshElements) -> Result<Found, Failure> {
-    let mut finder = args.backend.finder()?;
+    let mut finder = args.backend.finder(false)?;
     let subject = format!("{}: {}", name(path), kinds.0);
     let times = repeated(args, &subject, || search(&mut finder, kinds.of(elements)))?;
     let pairs = finder.pairs().iter().map(|pair| [pair.a, pair.b]);
@@ -177,6 +177,7 @@ fn report(args: &Args, frames: &[Frame<'_>], elements: &MeshElements, all: &[Fou
                 "pairs": found.report.pairs,
                 "invalid": found.report.invalid,
                 "backend": args.backend.in_use(found.report.fallback.as_deref()),
+                "fallback": found.report.fallback,
                 "plan": plan_text(&found.report),
                 "ms": found.ms,
             })

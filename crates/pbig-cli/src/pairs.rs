@@ -1,6 +1,6 @@
 //! `pbig pairs`: all overlapping pairs of the boxes in a file, or of a box of each of two files.
 
-use crate::backend::{BackendArgs, adapter_line};
+use crate::backend::{BackendArgs, adapter_line, is_software};
 use crate::mesh::{self, Kinds, kinds};
 use crate::options::{
     THREADS, check_inputs, check_output, plan_text, print_summary, search_text, stages, thickness, whole,
@@ -70,7 +70,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 fn search(args: &Args, input: &Path) -> Result<(), Failure> {
     let lists = read(args, input)?;
-    let mut finder = args.backend.finder()?;
+    let mut finder = args.backend.finder(args.with.is_none())?;
     let times = with_threads(args.threads, || find(&mut finder, &lists, args))?;
     args.backend.check_use(adapter(finder.report()), finder.report().fallback.as_deref())?;
     match &args.output {
@@ -150,6 +150,8 @@ fn report(args: &Args, finder: &Finder, lists: &[Named<'_>], ms: Spread) -> Resu
             "invalid": invalid,
             "backend": args.backend.in_use(report.fallback.as_deref()),
             "adapter": adapter(report),
+            "is_software": adapter(report).map(is_software),
+            "fallback": report.fallback,
             "plan": plan_text(report),
             "margin": args.margin,
             "ms": ms,

@@ -1,6 +1,6 @@
 //! `pbig replay`: the incremental path over frames of boxes.
 
-use crate::backend::{BackendArgs, adapter_line};
+use crate::backend::{BackendArgs, adapter_line, is_software};
 use crate::options::{check_output, margin, plan_text, print_summary, search_text, stages};
 use pbig_core::{Aabb, BroadPhase, Error, Pair, ProxyFilter};
 use pbig_harness::files::{Frames, name, read_frames, write_csv};
@@ -125,6 +125,7 @@ fn report(args: &Args, frames: &Frames, replay: &Replay, broad_phase: &BroadPhas
             "margin": args.margin.abs(),
             "backend": args.backend.in_use(report.fallback.as_deref()),
             "adapter": broad_phase.device_name(),
+            "is_software": broad_phase.device_name().map(is_software),
             "plan": plan_text(report),
             "stages": stages(report),
             "fallback": report.fallback,

@@ -1,6 +1,6 @@
 //! `pbig simulate` and `pbig scenes`: headless rapier worlds.
 
-use crate::backend::{BackendArgs, adapter_line};
+use crate::backend::{BackendArgs, adapter_line, is_software};
 use crate::options::{BODIES, whole};
 use pbig_harness::prelude::*;
 use pbig_harness::runner::{Run, StepTime};
@@ -109,7 +109,7 @@ fn report<B: BroadPhase>(
     ours: Option<&PbigBroadPhase>,
     file: Option<&PathBuf>,
 ) -> Result<(), Failure> {
-    let fallback = fallback_of(ours);
+    let (adapter, fallback) = (ours.and_then(PbigBroadPhase::device_name), fallback_of(ours));
     let backend = if ours.is_some() { args.backend.in_use(fallback) } else { "cpu" };
     let spread = |of: fn(&StepTime) -> f64| Spread::of(run.times.iter().map(of));
     let (broad_phase, step) = (spread(|time| time.broad_phase), spread(|time| time.step));
@@ -124,7 +124,8 @@ fn report<B: BroadPhase>(
             "steps": steps,
             "broad_phase": args.broad_phase,
             "backend": backend,
-            "adapter": ours.and_then(PbigBroadPhase::device_name),
+            "adapter": adapter,
+            "is_software": adapter.map(is_software),
             "ms": { "broad_phase": broad_phase, "step": step },
             "pairs": pairs,
             "added": added,
@@ -143,7 +144,7 @@ fn report<B: BroadPhase>(
         args.scene,
         args.broad_phase,
         checker.map_or(String::new(), |checker| format!("\n{}", check_line(checker))),
-        adapter_line(ours.and_then(PbigBroadPhase::device_name)),
+        adapter_line(adapter),
     ))
 }
 

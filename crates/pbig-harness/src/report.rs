@@ -14,6 +14,8 @@ pub struct BenchReport {
     pub head: Vec<(&'static str, String)>,
     pub tables: Vec<Table>,
     pub charts: Vec<Chart>,
+    /// The last line of the text; empty if there is none.
+    pub verdict: String,
 }
 
 impl BenchReport {
@@ -50,7 +52,7 @@ impl BenchReport {
             print(&self.object().to_string())?;
         } else {
             let head: String = self.heads().map(|(name, value)| format!("{name}: {value}\n")).collect();
-            print(&(head + &self.tables.iter().map(Table::show).collect::<String>()))?;
+            print(&(head + &self.tables.iter().map(Table::show).collect::<String>() + &self.verdict))?;
         }
         folder.map_or(Ok(()), |folder| self.write(folder))
     }

@@ -2,6 +2,7 @@
 
 use pbig_core::{Aabb, Backend, Config, DeviceReport, Finder, Limits, Report};
 use pbig_gpu::{DECLINED, GpuFinder, GpuOptions};
+use pbig_harness::output::warn;
 use pbig_harness::prelude::*;
 
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, ..Config::DEFAULT };
@@ -9,19 +10,42 @@ const ON_GPU: Config = Config { backend: Backend::Device, ..CONFIG };
 
 pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
-    let head = vec![("adapter", gpu.adapter().to_owned()), ("software", gpu.is_software().to_string())];
-    let tables = searches(&gpu, quick)?.into();
-    Ok(BenchReport { head, ..BenchReport::new("gpu", tables) })
+    let (name, is_software) = (gpu.adapter(), gpu.is_software());
+    if is_software {
+        warn(&format!("{name} is a program on the CPU: the times say nothing about a GPU"));
+    }
+    let head = vec![("adapter", name.to_owned()), ("software", is_software.to_string())];
+    let [searches, kernels] = searches(&gpu, quick)?;
+    let verdict = verdict(&searches, if is_software { "software adapter" } else { "GPU" });
+    Ok(BenchReport { head, verdict, ..BenchReport::new("gpu", vec![searches, kernels]) })
 }
 
-/// Returns the numbers of boxes. A software adapter gets fewer: ten million take minutes there, and the times say nothing.
-fn sizes(gpu: &GpuFinder, quick: bool) -> Vec<usize> {
-    let most = match (quick, gpu.is_software()) {
-        (true, _) => 10_000,
-        (false, true) => 1_000_000,
+/// Returns numbers of boxes, in ascending order, each with a set. A software adapter gets fewer: ten million take minutes there.
+fn cases(is_software: bool, quick: bool) -> Vec<(usize, &'static str)> {
+    let most = match (quick, is_software) {
+        (true, true) => 10_000,
         (false, false) => 10_000_000,
+        _ => 1_000_000,
     };
-    (3..=7).map(|power| 10usize.pow(power)).filter(|boxes| *boxes <= most).collect()
+    let sets: &[&str] = if quick { &["uniform", "mixed"] } else { &["uniform", "gaussian", "mixed"] };
+    let sizes = (3..=7).map(|power| 10usize.pow(power)).filter(|boxes| *boxes <= most);
+    let cases = sizes.flat_map(|n| sets.iter().map(move |set| (n, *set)));
+    // Ten million boxes of the set `gaussian` have over a billion pairs.
+    cases.filter(|case| *case != (10_000_000, "gaussian")).collect()
+}
+
+/// Returns a sentence about the number of boxes from which on the device is faster in every case. The CPU is faster where the
+/// device declines.
+fn verdict(searches: &Table, device: &str) -> String {
+    let is_faster = |row: &&Vec<Value>| searches.number(row, "cpu_over_gpu").is_some_and(|ratio| ratio > 1.0);
+    let (faster, slower): (Vec<_>, Vec<_>) = searches.rows.iter().partition(is_faster);
+    let boxes = |row: &&Vec<Value>| searches.number(row, "boxes");
+    let most = slower.iter().filter_map(boxes).fold(0.0, f64::max);
+    match faster.iter().filter_map(boxes).find(|boxes| *boxes > most) {
+        Some(boxes) => format!("The {device} is faster from {boxes} boxes on."),
+        None if faster.is_empty() => "The CPU was faster at every size.".into(),
+        None => format!("The {device} was faster in {} of {} cases.", faster.len(), searches.rows.len()),
+    }
 }
 
 fn boxes(set: &str, n: usize) -> Vec<Aabb> {
@@ -35,11 +59,7 @@ fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 2], Failure> {
     let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | steady_ms | wait_ms | upload_ms | plan_ms | record_ms | decode_ms | uploaded_bytes | downloaded_bytes | device_bytes";
     let mut table = Table::new("searches", columns);
     let mut kernels = Table::new("kernels", "set | boxes | kernel | kernel_ms");
-    let sets = ["uniform", "gaussian", "mixed"];
-    let cases = sizes(gpu, quick).into_iter().flat_map(|n| sets.map(|set| (n, set)));
-    // Ten million boxes of the set `gaussian` have over a billion pairs.
-    let cases: Vec<_> = cases.filter(|case| *case != (10_000_000, "gaussian")).collect();
-    for (n, set) in tracked(cases, "sets") {
+    for (n, set) in tracked(cases(gpu.is_software(), quick), "sets") {
         let Some(Searched { ms: [cpu, on_gpu, steady], pairs, report }) = search(gpu, set, n)? else {
             table.row(cells![set, n]);
             continue;
@@ -110,4 +130,31 @@ fn time(finder: &mut Finder, boxes: &[Aabb]) -> Result<f64, Failure> {
 fn on_device(report: &Report) -> Result<&DeviceReport, Failure> {
     let why = || Failure::Check(report.fallback.clone().unwrap_or_else(|| "the CPU did the work".into()));
     report.device.as_ref().ok_or_else(why)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quick_run_on_hardware_reaches_sizes_at_which_a_gpu_pays() {
+        let largest = |is_software, quick| cases(is_software, quick).last().copied();
+        assert_eq!(largest(false, true), Some((1_000_000, "mixed")));
+        assert_eq!(largest(true, true), Some((10_000, "mixed")));
+    }
+
+    #[test]
+    fn the_verdict_names_the_size_beyond_every_slower_case() {
+        let of = |ratios: [Option<f64>; 4]| {
+            let mut table = Table::new("searches", "set | boxes | cpu_over_gpu");
+            for (i, ratio) in ratios.into_iter().enumerate() {
+                table.row(cells!["a set", [1000, 100_000][i / 2], ratio]);
+            }
+            verdict(&table, "GPU")
+        };
+        assert_eq!(of([0.1, 2.0, 1.5, 3.0].map(Some)), "The GPU is faster from 100000 boxes on.");
+        assert_eq!(of([2.0; 4].map(Some)), "The GPU is faster from 1000 boxes on.");
+        assert_eq!(of([0.1; 4].map(Some)), "The CPU was faster at every size.");
+        assert_eq!(of([Some(0.1), Some(2.0), Some(3.0), None]), "The GPU was faster in 2 of 4 cases.");
+    }
 }

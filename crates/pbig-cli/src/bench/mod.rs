@@ -19,7 +19,7 @@ pub(crate) struct Args {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-    /// Small sizes only, in seconds.
+    /// Fewer and smaller cases, in seconds.
     #[arg(long)]
     quick: bool,
     /// Write the numbers as CSV, and the charts, into this folder.

@@ -61,10 +61,18 @@ fn bench_step_has_every_scene_and_writes_a_file() {
 }
 
 #[test]
-fn bench_gpu_has_both_backends() {
+fn bench_gpu_has_both_backends_and_a_verdict() {
     let tables = tables("gpu");
     let searches = rows(&tables, "searches");
-    assert!(searches.len() == 6 && searches.iter().all(|row| number(row, "cpu_over_gpu") > 0.0));
+    let output = pbig(std::path::Path::new("."), &["bench", "gpu", "--quick"]);
+    let [text, aside] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).expect("UTF-8"));
+    let is_software = text.contains("\nsoftware: true\n");
+    assert_eq!(searches.len(), if is_software { 4 } else { 8 });
+    assert!(searches.iter().all(|row| number(row, "cpu_over_gpu") > 0.0));
+    assert_eq!(aside.contains("the times say nothing about a GPU"), is_software, "{aside}");
+    let last = text.lines().last().expect("lines");
+    let device = if is_software { "The software adapter " } else { "The GPU " };
+    assert!(last == "The CPU was faster at every size." || last.starts_with(device), "{last}");
 }
 
 #[test]

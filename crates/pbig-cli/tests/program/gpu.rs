@@ -2,6 +2,7 @@
 
 use super::{json, pbig, pbig_where, refused, save};
 use ndarray::{Array2, Array3};
+use serde_json::Value;
 use std::path::Path;
 use std::process::Output;
 
@@ -22,21 +23,22 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// The adapter of `--backend gpu`, and true if it is software.
-fn adapter(folder: &Path) -> (String, bool) {
+/// The adapter of `--backend gpu`, true if it is software, and its number.
+fn adapter(folder: &Path) -> (String, bool, usize) {
     let doctor = json(&pbig(folder, &["doctor", "--json"]));
     let name = doctor["adapter"].as_str().expect("an adapter").to_owned();
     let adapters = doctor["adapters"].as_array().expect("a list");
-    let used: Vec<_> = adapters.iter().filter(|one| one["is_used"] == true).collect();
-    assert!(used.len() == 1 && used[0]["adapter"] == name.as_str() && used[0]["error"].is_null(), "{doctor}");
+    let used: Vec<_> = adapters.iter().enumerate().filter(|(_, one)| one["is_used"] == true).collect();
+    let [(number, used)] = used[..] else { panic!("{doctor}") };
+    assert!(used["adapter"] == name.as_str() && used["error"].is_null(), "{doctor}");
     assert!(doctor["self_test"].as_array().is_some_and(|all| all.len() >= 18), "{doctor}");
-    (name, used[0]["is_software"] == true)
+    (name, used["is_software"] == true, number)
 }
 
 #[test]
 fn the_summary_names_the_adapter_and_software_is_warned_of() {
     let folder = folder();
-    let (name, is_software) = adapter(folder.path());
+    let (name, is_software, _) = adapter(folder.path());
     for command in COMMANDS {
         let output = on_gpu(folder.path(), command, &[]);
         let [text, aside] =
@@ -48,6 +50,9 @@ fn the_summary_names_the_adapter_and_software_is_warned_of() {
             (aside.starts_with(&warning), aside.lines().count()),
             (is_software, usize::from(is_software))
         );
+        let object = json(&on_gpu(folder.path(), command, &["--json"]));
+        let said = (&object["is_software"], object.get("fallback"));
+        assert_eq!(said, (&is_software.into(), Some(&Value::Null)), "{object}");
         let required = on_gpu(folder.path(), command, &["--require-gpu"]);
         let status = required.status.code();
         let line = String::from_utf8_lossy(&required.stderr).into_owned();
@@ -69,7 +74,8 @@ fn a_required_gpu_that_is_missing_is_a_failure_without_output() {
         let output = pbig_where(folder.path(), "WGPU_ADAPTER_NAME", "no such adapter", &args);
         let line = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{line}");
-        assert!(line.starts_with("pbig: --require-gpu: the CPU did work: no GPU adapter named"), "{line}");
+        // After a search the line would say that the CPU did work.
+        assert!(line.starts_with("pbig: --require-gpu: no GPU adapter named"), "{line}");
         let args = [command, &["--backend", "gpu", "--json"]].concat();
         let warned = pbig_where(folder.path(), "WGPU_ADAPTER_NAME", "no such adapter", &args);
         let line = String::from_utf8_lossy(&warned.stderr).into_owned();
@@ -78,6 +84,9 @@ fn a_required_gpu_that_is_missing_is_a_failure_without_output() {
             warned.status.success() && line.contains(words) && line.contains("; `pbig doctor` says more"),
             "{line}"
         );
+        let object = json(&warned);
+        let said = (object.get("is_software"), object["fallback"].is_string());
+        assert_eq!(said, (Some(&Value::Null), true), "{object}");
         for option in [&["--require-gpu"][..], &["--adapter", "x"]] {
             refused(
                 &pbig(folder.path(), &[command, option].concat()),
@@ -85,21 +94,27 @@ fn a_required_gpu_that_is_missing_is_a_failure_without_output() {
             );
         }
     }
-    let output = pbig(
-        folder.path(),
-        &["pairs", "boxes.npy", "--with", "boxes.npy", "--backend", "gpu", "--require-gpu", "-o", "out.csv"],
-    );
-    assert!(output.status.code() == Some(1) && !folder.path().join("out.csv").exists());
+    std::fs::write(folder.path().join("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("written");
+    for input in [&["boxes.npy", "--with", "boxes.npy"][..], &["--mesh", "m.obj", "--elements", "ff"]] {
+        let command = [&["pairs"][..], input].concat();
+        let output = on_gpu(folder.path(), &command, &["--require-gpu", "-o", "out.csv"]);
+        let line = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(line, "pbig: --require-gpu: a search with --with or --mesh runs on the CPU\n");
+        assert!(output.status.code() == Some(1) && !folder.path().join("out.csv").exists());
+    }
 }
 
 #[test]
-fn an_adapter_is_chosen_by_a_part_of_its_name() {
+fn an_adapter_is_chosen_by_a_part_of_its_name_or_its_number() {
     let folder = folder();
-    let (name, _) = adapter(folder.path());
+    let (name, _, number) = adapter(folder.path());
     let part = name.split(' ').next().expect("a word").to_uppercase();
+    let number = format!("gpu {number}");
     for command in COMMANDS {
-        let object = json(&on_gpu(folder.path(), command, &["--adapter", &part, "--json"]));
-        assert_eq!(object["adapter"], name.as_str());
+        for choice in [&part, &number] {
+            let object = json(&on_gpu(folder.path(), command, &["--adapter", choice, "--json"]));
+            assert_eq!(object["adapter"], name.as_str());
+        }
         let words = "--adapter no such: no GPU adapter named \"no such\"; found: ";
         refused(&on_gpu(folder.path(), command, &["--adapter", "no such"]), &[words]);
     }
@@ -112,7 +127,7 @@ fn an_adapter_is_chosen_by_a_part_of_its_name() {
 #[test]
 fn doctor_obeys_what_pairs_obeys() {
     let folder = folder();
-    let (name, is_software) = adapter(folder.path());
+    let (name, is_software, _) = adapter(folder.path());
     let doctor = |variable: &str, value: &str| {
         let text = pbig_where(folder.path(), variable, value, &["doctor"]);
         let object = json(&pbig_where(folder.path(), variable, value, &["doctor", "--json"]));

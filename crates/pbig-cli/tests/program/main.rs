@@ -123,7 +123,7 @@ fn pairs_writes_csv_too_and_reports_as_documented() {
     let args =
         ["pairs", "boxes.npy", "-o", "out.csv", "--threads", "1", "--repeat", "3", "--strict", "--json"];
     let object = json(&pbig(folder.path(), &args));
-    for key in ["boxes", "pairs", "invalid", "backend", "adapter", "plan"] {
+    for key in ["boxes", "pairs", "invalid", "backend", "adapter", "is_software", "fallback", "plan"] {
         assert!(object.get(key).is_some(), "{key} is missing");
     }
     let ms = |key: &str| object["ms"][key].as_f64().expect("a number");

@@ -81,6 +81,7 @@ fn pairs_of_a_mesh_leave_out_neighbours() {
     );
     let lines = |kind: &str| Some(text.lines().filter(|line| line.starts_with(kind)).count() as u64);
     assert_eq!(pairs, ["ee", "vf", "ff"].map(|kind| (Some(kind), lines(kind))));
+    assert!(searches.iter().all(|one| one.get("fallback").is_some()), "{object}");
     // Without the motion nothing meets.
     let still =
         json(&pbig(here, &["pairs", "--mesh", "mesh.obj", "--elements", "ff", "-o", "ff.npy", "--json"]));

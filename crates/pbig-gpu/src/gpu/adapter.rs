@@ -38,8 +38,9 @@ pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter> {
     Ok(all[place].clone())
 }
 
-/// Returns the place of the first adapter with the wanted name, or what was wanted and found. A part of the name is enough, in any
-/// case. `api` and `named` are the values of `WGPU_BACKEND` and `WGPU_ADAPTER_NAME`.
+/// Returns the place of the wanted adapter, or what was wanted and found. It is wanted by its place, such as `1` or `gpu 1`, or by a
+/// part of its name, in any case; the first with that part counts. `api` and `named` are the values of `WGPU_BACKEND` and
+/// `WGPU_ADAPTER_NAME`.
 fn place_of(
     name: Option<&str>,
     api: Option<&str>,
@@ -51,7 +52,9 @@ fn place_of(
     }
     let wanted = name.or(named);
     let part = wanted.unwrap_or_default().to_lowercase();
-    names.iter().position(|name| name.to_lowercase().contains(&part)).ok_or_else(|| {
+    let place = part.trim_start_matches("gpu ").parse::<usize>().ok().filter(|place| *place < names.len());
+    let by_name = || names.iter().position(|name| name.to_lowercase().contains(&part));
+    place.or_else(by_name).ok_or_else(|| {
         let wanted = wanted.map(|name| format!(" named {name:?}")).unwrap_or_default();
         let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
         let cause = match api {
@@ -89,6 +92,9 @@ mod tests {
         let names = ["Iris Xe", "llvmpipe (LLVM 15)"].map(str::to_owned);
         let of_call = [None, Some("xe"), Some("LLVMPIPE")].map(|name| place_of(name, None, None, &names));
         assert_eq!(of_call, [Ok(0), Ok(0), Ok(1)]);
+        // No place 15: the name has it.
+        let of_place = ["0", "gpu 1", "15"].map(|name| place_of(Some(name), None, None, &names));
+        assert_eq!(of_place, [Ok(0), Ok(1), Ok(1)]);
         assert_eq!(place_of(None, None, Some("llvm"), &names), Ok(1), "the variable's");
         assert_eq!(place_of(Some("iris"), None, Some("llvm"), &names), Ok(0), "the call's comes first");
         assert_eq!(place_of(None, Some("vulkan"), None, &names), Ok(0));

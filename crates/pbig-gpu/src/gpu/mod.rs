@@ -47,7 +47,8 @@ pub fn adapters() -> Vec<wgpu::Adapter> {
     wait::block_on(async { Ok::<_, GpuError>(adapter::best_first().await) }).unwrap_or_default()
 }
 
-/// Returns the adapter whose name contains `name`, in any case; without a name the one that [`GpuFinder::new`] uses.
+/// Returns the adapter whose name contains `name`, in any case, or whose place among [`adapters`] is `name`, such as `1` or `gpu 1`;
+/// without a name the one that [`GpuFinder::new`] uses.
 ///
 /// # Errors
 /// As [`GpuFinder::new`], if there is no such adapter.
