@@ -48,7 +48,8 @@ fn charts(tables: &[Table], is_software: bool) -> Vec<Chart> {
         ("PBIG's grid, CPU, one thread", "ms, PBIG's grid, CPU, one thread"),
         (gpu, "ms, GPU"),
     ];
-    let of_uniform = of_uniform.map(|(name, y)| uniform.line(name, ["boxes", y], |_| name != gpu || !is_software));
+    let of_uniform =
+        of_uniform.map(|(name, y)| uniform.line(name, ["boxes", y], |_| name != gpu || !is_software));
     let mut sizes: Vec<_> = cells.column("boxes").collect();
     sizes.dedup();
     let of_size = |size: &Value| {

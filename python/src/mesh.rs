@@ -75,12 +75,8 @@ impl<'a> Mesh<'a> {
         edges: Option<&'a [[u32; 2]]>,
         margin: f64,
     ) -> Self {
-        let vertices = from
-            .par_iter()
-            .zip(to)
-            .with_min_len(BOXES_OF_THREAD)
-            .map(|(from, to)| swept(from, to, margin))
-            .collect();
+        let steps = from.par_iter().zip(to).with_min_len(BOXES_OF_THREAD);
+        let vertices = steps.map(|(from, to)| swept(from, to, margin)).collect();
         Self { vertices, faces, edges }
     }
 

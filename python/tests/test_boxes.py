@@ -114,6 +114,26 @@ def test_float64_is_rounded_outward():
     assert pbig.pairs(boxes.astype(np.float32)).tolist() == []
 
 
+@pytest.mark.parametrize("kind", ["i1", "u1", ">i2", "u4", "i8", "u8"])
+def test_whole_numbers_are_read_as_float64(kind):
+    places = SCENES["touching"]
+    boxes, wanted = places.astype(kind), brute.pairs(places)
+    check(pbig.pairs(boxes), wanted)
+    check(pbig.pairs(boxes.tolist()), wanted)
+    check(pbig.pairs_between(boxes, places / 2), brute.between(places, places / 2))
+    broad_phase = pbig.BroadPhase()
+    broad_phase.set_all(boxes[:-1])
+    broad_phase.set([len(boxes) - 1], boxes[-1:])
+    check(broad_phase.update()[0], wanted)
+
+
+def test_whole_numbers_are_rounded_outward():
+    # float32 has no odd numbers here. The nearest ones to the first two ends are 2**24 and 2**24 + 2.
+    boxes = [[0, 0, 0, 2**24 + 1, 1, 1], [2**24 + 2, 0, 0, 2**24 + 4, 1, 1]]
+    assert pbig.pairs(boxes).tolist() == [[0, 1]]
+    assert pbig.pairs(np.array(boxes, np.float32)).tolist() == []
+
+
 def test_a_box_that_is_inverted_in_float64_alone_has_no_pairs():
     boxes = np.array([[0, 0, 0, 2, 2, 2], [1 + 1e-12, 1, 1, 1, 1, 1]])
     assert pbig.pairs(boxes).tolist() == []

@@ -102,9 +102,12 @@ def test_arrays_of_any_layout_and_type_have_the_same_candidates():
         (np.asfortranarray(vertices), np.asfortranarray(faces.astype(np.uint32))),
         (vertices.repeat(2, axis=0)[::2], faces.astype(">u8")),
         (vertices.tolist(), faces.tolist()),
+        (vertices.astype(np.int64), faces),
+        (vertices.astype(">u2"), faces),
+        (vertices.astype(int).tolist(), faces.tolist()),
     ]
     for vertices, faces in others:
-        assert pbig.mesh_pairs(vertices, faces)["ee"].tolist() == wanted
+        assert pbig.mesh_pairs(vertices, faces, after=vertices)["ee"].tolist() == wanted
 
 
 @pytest.mark.parametrize("mesh", MESHES)

@@ -24,21 +24,21 @@ def pairs(boxes: ArrayLike) -> Pairs:
     """Returns every pair of overlapping boxes.
 
     Boxes are closed: two that touch overlap. A box with a NaN, or a minimum above its maximum, pairs with nothing, and a
-    UserWarning tells of it. Extents may be infinite. For a margin r give `boxes + [-r, -r, -r, r, r, r]`. Boxes in
-    float64 are rounded outward to float32, so no pair is missed. A float32 array in C order is read in place: no other
-    thread may write to it meanwhile.
+    UserWarning tells of it. Extents may be infinite. For a margin r give `boxes + [-r, -r, -r, r, r, r]`. Whole numbers
+    become float64. Boxes in float64 are rounded outward to float32, so no pair is missed. A float32 array in C order is
+    read in place: no other thread may write to it meanwhile.
 
     Args:
-        boxes: float32 or float64, shape (n, 6), min xyz and max xyz in a row, or (n, 2, 3). At most 2**27.
+        boxes: float32, float64 or whole numbers, shape (n, 6), min xyz and max xyz in a row, or (n, 2, 3). At most 2**27.
 
     Returns:
         uint32, shape (m, 2): each row i < j, sorted by i, then j.
 
     Raises:
-        TypeError: The values are not float32 or float64.
+        TypeError: The values are not float32, float64 or whole numbers.
         ValueError: The shape is another, there are too many boxes, or more than 2**28 pairs.
 
-    >>> boxes = [[0.0, 0, 0, 1, 1, 1], [1, 0, 0, 2, 1, 1], [5, 5, 5, 6, 6, 6]]
+    >>> boxes = [[0, 0, 0, 1, 1, 1], [1, 0, 0, 2, 1, 1], [5, 5, 5, 6, 6, 6]]
     >>> pbig.pairs(boxes).tolist()
     [[0, 1]]
     """
@@ -90,7 +90,7 @@ def mesh_pairs(
     float32 and faces that name a vertex twice; `warnings.simplefilter("error")` makes errors of them.
 
     Args:
-        vertices: float32 or float64, shape (n, 3): a place in a row.
+        vertices: float32, float64 or whole numbers, shape (n, 3): a place in a row.
         faces: Whole numbers, shape (m, 3) or (m, 4): the vertices of a face in a row, counted from 0.
         after: The vertices at the end of a step. A box then holds its element on the straight way there.
         margin: Length by which each box grows on all sides, rounded outward: half a thickness.
@@ -155,11 +155,11 @@ class BroadPhase:
         ValueError: The margin is negative or not finite in float32.
 
     >>> broad_phase = pbig.BroadPhase()
-    >>> broad_phase.set_all([[0.0, 0, 0, 1, 1, 1], [2, 0, 0, 3, 1, 1]])
+    >>> broad_phase.set_all([[0, 0, 0, 1, 1, 1], [2, 0, 0, 3, 1, 1]])
     >>> added, removed = broad_phase.update()
     >>> len(added)
     0
-    >>> broad_phase.set([1], [[1.0, 0, 0, 2, 1, 1]])
+    >>> broad_phase.set([1], [[1, 0, 0, 2, 1, 1]])
     >>> added, removed = broad_phase.update()
     >>> added.tolist(), removed.tolist()
     ([[0, 1]], [])

@@ -146,9 +146,12 @@ def _indices(name: str, array: NDArray[Any], what: str, limit: int) -> NDArray[A
 
 
 def _float_type(name: str, array: NDArray[Any]) -> type[np.floating[Any]]:
+    """Returns float32 for float32, and float64 for float64 and whole numbers."""
+    if array.dtype.kind in "iu":
+        return np.float64
     if array.dtype.kind == "f" and array.dtype.itemsize in (4, 8):
         return np.float32 if array.dtype.itemsize == 4 else np.float64
-    remedy = f"give float32 or float64, such as numpy.asarray({name}, dtype=float)"
+    remedy = f"give float32, float64 or whole numbers, such as numpy.asarray({name}, dtype=float)"
     raise TypeError(f"{name} has values of the type {array.dtype}; {remedy}")
 
 
