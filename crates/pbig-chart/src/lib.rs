@@ -149,7 +149,8 @@ impl Plot {
         let (head, area) = area.split_vertically(HEAD);
         head.draw(&Text::new(self.title.as_str(), (12, 10), ("sans-serif", TITLE).into_font()))?;
         // Above the axis there is room for a long label, beside it there is none.
-        head.draw(&Text::new(self.y.as_str(), (12, 40), ("sans-serif", TEXT).into_font()))?;
+        let scale = if self.is_log_y { ", logarithmic" } else { "" };
+        head.draw(&Text::new(format!("{}{scale}", self.y), (12, 40), ("sans-serif", TEXT).into_font()))?;
         let mut chart = ChartBuilder::on(&area)
             .margin(12)
             .x_label_area_size(60)

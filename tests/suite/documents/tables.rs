@@ -38,14 +38,8 @@ pub(super) const TABLES: &[Table] = &[
             ("its queries", "stock_queries_mean_ms → pbig_queries_mean_ms")] },
     Table { name: "crates", csv: "crates-036",
         rows: &[
-            ("crate", "rapier2d"), ("scene", "rain|city"), ("bodies", "10000|100000"),
-            ("queries", "none")],
-        columns: &[("scene", "scene"), ("bodies", "bodies"), ("broad phase", BROAD), ("frame", FRAME)] },
-    Table { name: "steps-027", csv: "step",
-        rows: &[("scene", "column|pile|mixed"), ("bodies", "10000")],
-        columns: &[("scene", "scene"), ("bodies", "bodies"), ("broad phase", BROAD),
-            ("step", "stock_step_mean_ms → pbig_step_mean_ms"),
-            ("step, p99", "stock_step_p99_ms → pbig_step_p99_ms")] },
+            ("crate", "rapier3d|rapier2d"), ("scene", "rain|city"), ("bodies", "10000|100000")],
+        columns: &[("crate", "crate"), ("scene", "scene"), ("bodies", "bodies"), ("broad phase", BROAD), ("frame", FRAME)] },
     Table { name: "peers", csv: "peers",
         rows: &[
             ("case", "events, all moved, unit|events, all drift, unit|events, 1% moved, unit|from scratch, unit"),
@@ -104,7 +98,7 @@ pub(super) const TABLES: &[Table] = &[
     // docs/ARCHITECTURE.md
     Table { name: "mechanisms", csv: "mechanisms",
         rows: &[("verdict", "stays")],
-        columns: &[("mechanism", "mechanism"), ("scene", "scene"), ("without / with", "without_over_with")] },
+        columns: &[("mechanism", "mechanism"), ("without / with", "without_over_with")] },
     // avian/README.md
     Table { name: "avian", csv: "avian", rows: &[],
         columns: &[("scene", "scene"), ("bodies", "bodies"),

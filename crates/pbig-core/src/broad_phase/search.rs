@@ -35,19 +35,20 @@ impl Search {
         let all = Boxes { boxes, filters: world.noted.is_filtered.then_some(&filters[..]), keys: None };
         let is_on_device = device.is_some();
         task.report.work += (boxes.len() - world.present.len()) as u64;
-        let grouping = Some(Grouping::new(boxes.len()));
+        let grouping = Grouping::new(boxes.len());
         if let Some(device) = device {
-            if !self.all_pairs.find_on(device, &all, task.config, grouping, task.report)? {
+            if !self.all_pairs.find_on(device, &all, task.config, Some(grouping), task.report)? {
                 return Ok(false);
             }
         } else {
-            let request = Request { grouping, is_repeated: true, ..Request::of_one(&all, task.config) };
+            let request =
+                Request { grouping: Some(grouping), is_repeated: true, ..Request::of_one(&all, task.config) };
             self.all_pairs.find(&request, &mut self.store, task.report)?;
         }
         if self.store.has_tree && !is_on_device && !is_listed {
             task.tree.adopt(&mut self.store.tree);
         }
-        stage!(task.report, diff, self.compare(task, is_on_device, is_listed));
+        stage!(task.report, diff, self.compare(task, grouping, is_on_device, is_listed));
         Ok(true)
     }
 
@@ -66,7 +67,7 @@ impl Search {
         self.groups.settle(pairs);
     }
 
-    fn compare(&mut self, task: &mut Task<'_>, is_on_device: bool, is_listed: bool) {
+    fn compare(&mut self, task: &mut Task<'_>, grouping: Grouping, is_on_device: bool, is_listed: bool) {
         let algorithm = task.report.plan.algorithm;
         let is_brute = !is_on_device && matches!(algorithm, Algorithm::Brute | Algorithm::Nothing);
         let world = task.world;
@@ -83,13 +84,13 @@ impl Search {
                 .map(|pair| Pair { a: name(pair.a), b: name(pair.b) });
             return task.comparison.compare_sorted(world.present.iter(), found, task.kept);
         }
-        let boxes = names.map_or(world.ids(), <[u32]>::len);
-        self.all_pairs.gather(Grouping::new(boxes), &mut self.groups);
+        self.all_pairs.gather(grouping, &mut self.groups);
         if let Some(names) = names {
             self.groups.rename_partners(names);
         }
         let doubted = is_on_device.then_some(&world.present);
-        task.comparison.run((&mut self.groups, names), task.kept, AllPairs::workers(boxes), doubted);
+        let workers = AllPairs::workers(grouping.ids);
+        task.comparison.run((&mut self.groups, names), task.kept, workers, doubted);
     }
 }
 

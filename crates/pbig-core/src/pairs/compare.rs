@@ -78,14 +78,15 @@ impl Comparison {
             let (first_id, first_place) =
                 (grouping.ids_of(group).start as u32, pairs.range(group).start as u32);
             part.clear();
-            pairs.sort(group, sorter, spans, pool, first_place);
+            pairs.sort(group, sorter, spans, pool);
             if let Some(known) = doubted {
                 let name = |place: u32| names.map_or(place, |names| names[place as usize]);
                 let rows = spans.iter_mut().zip((first_id..).map(name));
-                groups::drop_false(rows, pool, first_place, known);
+                groups::drop_false(rows, pool, known);
             }
-            let new = NewRows { names, first_id, first_place, spans, pool };
+            let new = NewRows { names, first_id, spans, pool };
             dispatch!(compare, part, old, &new);
+            spans.iter_mut().for_each(|span| span.start += first_place);
         });
         found.sorters = sorters;
         kept.next = next;
@@ -134,8 +135,7 @@ struct NewRows<'a> {
     names: Option<&'a [u32]>,
     /// The place of the group's first row among all rows.
     first_id: u32,
-    /// The place of the group's first row in the pool of all rows.
-    first_place: u32,
+    /// Where each row lies in the pool of the group.
     spans: &'a [Span],
     pool: &'a [u32],
 }
@@ -145,8 +145,7 @@ struct NewRows<'a> {
 fn compare(simd: impl Simd, part: &mut Differences, old: &Rows, new: &NewRows<'_>) {
     for (place, span) in (new.first_id..).zip(new.spans) {
         let a = new.names.map_or(place, |names| names[place as usize]);
-        let start = (span.start - new.first_place) as usize;
-        let (was, is) = (old.spans[a as usize].range(), start..start + span.len as usize);
-        row::compare(simd, a, (&old.pool, was), (new.pool, is), part);
+        let was = old.spans[a as usize].range();
+        row::compare(simd, a, (&old.pool, was), (new.pool, span.range()), part);
     }
 }

@@ -25,7 +25,6 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    const NONE: Self = Self { low: [FARTHEST; 4], high: [-FARTHEST; 4], extent: [0.0; 4] };
     const EMPTY: Self = Self { low: [f32::INFINITY; 4], high: [f32::NEG_INFINITY; 4], extent: [0.0; 4] };
 
     pub(super) fn of_both([first, second]: [&[Aabb]; 2], workers: usize) -> Self {
@@ -35,10 +34,10 @@ impl Bounds {
 
     fn of(boxes: &[Aabb], workers: usize) -> Self {
         if workers <= 1 {
-            return Self::NONE.widened(boxes).limited();
+            return Self::EMPTY.widened(boxes).limited();
         }
-        let part = |piece| Self::NONE.widened(&boxes[piece_range(boxes.len(), piece, workers)]);
-        map(workers, part).into_iter().fold(Self::NONE, |all, part| all.merged(&part)).limited()
+        let part = |piece| Self::EMPTY.widened(&boxes[piece_range(boxes.len(), piece, workers)]);
+        map(workers, part).into_iter().fold(Self::EMPTY, |all, part| all.merged(&part)).limited()
     }
 
     /// Returns the bounds of some boxes and of these.
