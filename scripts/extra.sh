@@ -5,7 +5,7 @@
 #   publish                what would be published; publishes nothing
 #   wasm                   the corpus and a rapier world under node, pbig without and with SIMD; from clean two minutes
 #   aarch64, windows       pbig-core's unit tests, the corpus and a rapier world under qemu, under wine; ten minutes, five
-#   targets                checks that all compiles for Windows, macOS, iOS and Android; five minutes
+#   targets                checks that core, GPU and rapier 0.27 compile for Windows, macOS, iOS and Android; five minutes
 #   viewer                 builds, lints and tests the viewer
 #   pictures               makes docs/images again from a fixed seed, with the times of this machine
 #   avian                  lints and tests the plug-ins for avian; builds bevy, from clean ten minutes
@@ -310,12 +310,12 @@ run_fuzz() {
 setup=true
 if [ "${1:-}" = --no-setup ]; then setup=false && shift; fi
 name=${1:-}
+declare -F "run_$name" >/dev/null || { sed -n '2,/^set/s/^# \{0,1\}//p' "$0" >&2 && exit 2; }
 case $name in
 wasm | aarch64 | windows) parts="rust $name" ;;
 viewer | pictures) parts="rust vulkan $name" ;;
 publish) parts="rust deny msrv semver" ;;
-features | avian | python | sanitize | fuzz) parts=rust ;;
-*) sed -n '2,/^set/s/^# \{0,1\}//p' "$0" >&2 && exit 2 ;;
+*) parts=rust ;;
 esac
 shift
 if $setup; then scripts/setup.sh $parts || true; fi

@@ -3,7 +3,7 @@
     python python/benches/against_ipctk.py FOLDER [--rounds 9] [--radius 0]
 
 A folder below FOLDER with two frames of the same triangles is a scene, as in the public data of Scalable-CCD. A frame is
-an .obj, or a binary .ply of vertices and then faces. The table has ipctk → pbig, in milliseconds.
+an .obj, or a binary .ply of vertices and then faces. The output is a CSV file; times are milliseconds.
 """
 
 import argparse
@@ -68,9 +68,9 @@ def row(name, before, after, faces, rounds, radius):
             found = sides[side]()
             times[side, turn] = (time.perf_counter() - start) * 1e3
             del found  # outside of the time
-    counts = f"{len(ee) + len(vf):,} → {sum(map(len, ours.values())):,}"
-    spread = np.median(times, axis=1), np.percentile(times, 99, axis=1, method="higher")
-    return f"| {name} | {len(faces):,} | {counts} | " + " | ".join("{:.1f} → {:.1f}".format(*ms) for ms in spread) + " |"
+    spread = [*np.median(times, axis=1), *times.max(axis=1)]
+    return ",".join(map(str, [name, len(faces), len(ee) + len(vf), sum(map(len, ours.values())), *np.round(spread, 2)]))
+
 
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -78,7 +78,8 @@ parser.add_argument("folder", type=pathlib.Path)
 parser.add_argument("--rounds", type=int, default=9)
 parser.add_argument("--radius", type=float, default=0.0)
 args = parser.parse_args()
-print("| scene | faces | candidates | median | p99 |\n|---|---|---|---|---|")
+print(f"# cores: {os.cpu_count()}\n# ipctk: {importlib.metadata.version('ipctk')}\n# rounds: {args.rounds}")
+print("scene,faces,ipctk_pairs,pbig_pairs,ipctk_median_ms,pbig_median_ms,ipctk_slowest_ms,pbig_slowest_ms")
 for folder in sorted({path.parent for path in args.folder.resolve().rglob("*") if path.suffix in (".obj", ".ply")}):
     frames = sorted(path for path in folder.iterdir() if path.suffix in (".obj", ".ply"))
     assert len(frames) == 2, f"{folder}: {len(frames)} frames, not two"
@@ -86,4 +87,3 @@ for folder in sorted({path.parent for path in args.folder.resolve().rglob("*") i
     assert np.array_equal(faces, later), f"{folder}: the frames differ in their faces"
     name = (folder.parent if folder.name == "frames" else folder).name
     print(row(name, before, after, faces, args.rounds, args.radius), flush=True)
-print(f"\n_cores: {os.cpu_count()}, ipctk {importlib.metadata.version('ipctk')}, rounds: {args.rounds}_")

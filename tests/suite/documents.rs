@@ -106,7 +106,9 @@ fn files(ending: &str) -> Vec<PathBuf> {
 #[test]
 fn tables_have_the_measured_numbers() {
     let mut used = vec![];
-    for path in files("md").into_iter().chain(["README.md", "avian/README.md"].map(|file| root().join(file)))
+    for path in files("md")
+        .into_iter()
+        .chain(["README.md", "avian/README.md", "python/README.md"].map(|file| root().join(file)))
     {
         let document = text_of(&path);
         let (new, names) = written(&document, measured);

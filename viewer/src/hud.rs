@@ -73,7 +73,7 @@ pub struct HudSide<'a> {
     pub history: &'a History,
     /// Where the graph's axis ends, in ms: the same on both sides.
     pub end_ms: f64,
-    /// The scene that both sides show, for the upper line.
+    /// The title of the graph.
     pub title: String,
 }
 
@@ -104,7 +104,7 @@ fn add_times(sheet: &mut Sheet, side: &HudSide<'_>, width: f32, text: f32) {
     let large = 1.7 * text;
     let behind = (median.chars().count() as f32 * 0.54) * large + 0.8 * text;
     sheet.text(median, [0.5 * text, 1.4 * text], large, colour);
-    sheet.text("median of a step", [behind, 2.1 * text], 0.95 * text, INK);
+    sheet.text("broad phase, median", [behind, 2.1 * text], 0.95 * text, INK);
 }
 
 #[cfg(test)]

@@ -20,16 +20,22 @@ pub(crate) struct BackendArgs {
 }
 
 impl BackendArgs {
-    /// Returns a finder for one set of boxes. All other searches run on the CPU.
-    pub(crate) fn finder(&self, has_one_set: bool) -> Result<Finder, Failure> {
-        if self.kind == BackendOption::Gpu && self.require_gpu && !has_one_set {
-            return Err(required("a search with --with or --mesh runs on the CPU"));
-        }
+    /// Returns a finder for one set of boxes.
+    pub(crate) fn finder(&self) -> Result<Finder, Failure> {
         let config = Config { backend: self.kind.backend(), ..Config::DEFAULT };
         Ok(match self.device()? {
             Some(device) => Finder::with_device(config, device),
             None => Finder::new(config),
         })
+    }
+
+    /// Returns a finder for two sets or a mesh, which no device searches.
+    pub(crate) fn finder_on_cpu(&self) -> Result<Finder, Failure> {
+        self.check_options()?;
+        if self.require_gpu {
+            return Err(required("a search with --with or --mesh runs on the CPU"));
+        }
+        Ok(Finder::new(Config { backend: self.kind.backend(), ..Config::DEFAULT }))
     }
 
     pub(crate) fn broad_phase(&self, margin: f32) -> Result<BroadPhase, Failure> {
@@ -64,9 +70,10 @@ impl BackendArgs {
     /// Opens the adapter. If a GPU is required, fails before the search.
     fn gpu(&self) -> Result<GpuFinder, Failure> {
         let mut gpu = match &self.adapter {
-            Some(name) => pbig_gpu::adapter(Some(name))
-                .and_then(|adapter| GpuFinder::on(&adapter))
-                .map_err(|error| Failure::Input(format!("--adapter {name}: {error}")))?,
+            Some(name) => {
+                let gpu = pbig_gpu::adapter(Some(name)).and_then(|adapter| GpuFinder::on(&adapter));
+                gpu.map_err(|error| self.no_adapter(format!("--adapter {name}: {error}")))?
+            }
             None => GpuFinder::shared(),
         };
         match gpu.prepare() {
@@ -74,6 +81,10 @@ impl BackendArgs {
             // The report of the search has the reason of a failure.
             _ => Ok(gpu),
         }
+    }
+
+    fn no_adapter(&self, why: String) -> Failure {
+        if self.require_gpu { required(&why) } else { Failure::Input(why) }
     }
 
     /// Warns of a software adapter, or refuses it, before its long work.

@@ -136,7 +136,7 @@ fn for_kinds(output: &Path, Kinds(kinds): &Kinds) -> PathBuf {
 }
 
 fn find(args: &Args, path: &Path, kinds: &Kinds, elements: &MeshElements) -> Result<Found, Failure> {
-    let mut finder = args.backend.finder(false)?;
+    let mut finder = args.backend.finder_on_cpu()?;
     let subject = format!("{}: {}", name(path), kinds.0);
     let times = repeated(args, &subject, || search(&mut finder, kinds.of(elements)))?;
     let pairs = finder.pairs().iter().map(|pair| [pair.a, pair.b]);

@@ -70,7 +70,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 fn search(args: &Args, input: &Path) -> Result<(), Failure> {
     let lists = read(args, input)?;
-    let mut finder = args.backend.finder(args.with.is_none())?;
+    let mut finder = if args.with.is_none() { args.backend.finder() } else { args.backend.finder_on_cpu() }?;
     let times = with_threads(args.threads, || find(&mut finder, &lists, args))?;
     args.backend.check_use(adapter(finder.report()), finder.report().fallback.as_deref())?;
     match &args.output {

@@ -14,7 +14,7 @@ pub struct BenchReport {
     pub head: Vec<(&'static str, String)>,
     pub tables: Vec<Table>,
     pub charts: Vec<Chart>,
-    /// The last line of the text; empty if there is none.
+    /// The conclusion, for a person; empty if there is none.
     pub verdict: String,
 }
 
@@ -43,7 +43,7 @@ impl BenchReport {
             self.heads().map(|(name, value)| (name.into(), json!(value))).collect();
         let tables: serde_json::Map<_, _> =
             self.tables.iter().map(|table| (table.name.clone(), table.object())).collect();
-        json!({ "suite": self.suite, "head": head, "tables": tables })
+        json!({ "suite": self.suite, "head": head, "tables": tables, "verdict": self.verdict })
     }
 
     /// Prints the tables, or one JSON object; writes the files and the charts if there is a folder for them.

@@ -21,7 +21,7 @@ const BROAD: &str = "stock_broad_mean_ms → pbig_broad_mean_ms";
 pub(super) const TABLES: &[Table] = &[
     // README.md
     Table { name: "frames", csv: "frames", rows: &[],
-        columns: &[("scene", "scene"), ("bodies", "bodies"), ("broad phase", BROAD), ("frame", FRAME), ("frame, p99", FRAME_P99)] },
+        columns: &[("scene", "scene"), ("bodies", "bodies"), ("frames", "steps"), ("broad phase", BROAD), ("frame", FRAME), ("frame, p99", FRAME_P99)] },
     // docs/PERFORMANCE.md
     Table { name: "steady", csv: "steady",
         rows: &[
@@ -39,7 +39,7 @@ pub(super) const TABLES: &[Table] = &[
     Table { name: "crates", csv: "crates-036",
         rows: &[
             ("crate", "rapier3d|rapier2d"), ("scene", "rain|city"), ("bodies", "10000|100000")],
-        columns: &[("crate", "crate"), ("scene", "scene"), ("bodies", "bodies"), ("broad phase", BROAD), ("frame", FRAME)] },
+        columns: &[("crate", "crate"), ("scene", "scene"), ("bodies", "bodies"), ("frames", "steps"), ("broad phase", BROAD), ("frame", FRAME)] },
     Table { name: "peers", csv: "peers",
         rows: &[
             ("case", "events, all moved, unit|events, all drift, unit|events, 1% moved, unit|from scratch, unit"),
@@ -99,6 +99,10 @@ pub(super) const TABLES: &[Table] = &[
     Table { name: "mechanisms", csv: "mechanisms",
         rows: &[("verdict", "stays")],
         columns: &[("mechanism", "mechanism"), ("without / with", "without_over_with")] },
+    // python/README.md
+    Table { name: "ipctk", csv: "ipctk", rows: &[],
+        columns: &[("scene", "scene"), ("faces", "faces"), ("candidates", "ipctk_pairs → pbig_pairs"),
+            ("median", "ipctk_median_ms → pbig_median_ms"), ("slowest", "ipctk_slowest_ms → pbig_slowest_ms")] },
     // avian/README.md
     Table { name: "avian", csv: "avian", rows: &[],
         columns: &[("scene", "scene"), ("bodies", "bodies"),

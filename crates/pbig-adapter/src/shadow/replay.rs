@@ -40,11 +40,15 @@ pub fn write_frames<'a>(
     write().map_err(|cause| ReplayError { file: file.into(), cause })
 }
 
-/// Returns the head of an `.npy` file of version 1.0: 128 bytes. A crate for it would bring twenty to every app that checks.
+/// Length of the text in the head of a file. With the ten bytes before it these are 128.
+const HEAD_TEXT: u16 = 118;
+
+/// Returns the head of an `.npy` file of version 1.0. Crates that write it bring twenty others to an app that checks.
 fn head(frames: usize, boxes: usize) -> Vec<u8> {
-    let shape = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({frames}, {boxes}, 6), }}");
-    let mut head = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
-    head.extend(format!("{shape:<117}\n").bytes());
+    let text = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({frames}, {boxes}, 6), }}");
+    let mut head = b"\x93NUMPY\x01\x00".to_vec();
+    head.extend(HEAD_TEXT.to_le_bytes());
+    head.extend(format!("{text:<0$}\n", usize::from(HEAD_TEXT) - 1).bytes());
     head
 }
 
@@ -54,4 +58,32 @@ pub(super) fn write_into(folder: &Path, frames: &VecDeque<Vec<Aabb>>) -> Result<
     let name = format!("pbig-difference-{}-{}.npy", now.as_nanos(), std::process::id());
     let file = folder.join(name);
     write_frames(&file, frames).map(|()| file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_has_a_head_of_128_bytes_and_nan_for_absent_boxes() {
+        let aabb = |x: f32| Aabb::new([x; 3], [x + 1.0; 3]);
+        let file = std::env::temp_dir().join(format!("pbig-replay-{}.npy", std::process::id()));
+        for (frames, shape) in
+            [(vec![vec![aabb(1.0), aabb(2.0)], vec![aabb(3.0)]], "(2, 2, 6)"), (vec![], "(0, 0, 6)")]
+        {
+            write_frames(&file, &frames).expect("written");
+            let bytes = std::fs::read(&file).expect("read");
+            assert_eq!(bytes[..10], *b"\x93NUMPY\x01\x00\x76\x00");
+            let head = std::str::from_utf8(&bytes[10..128]).expect("text");
+            assert!(head.contains(shape) && head.ends_with(" \n"), "{head}");
+            let (values, rest) = bytes[128..].as_chunks::<4>();
+            let values: Vec<_> = values.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+            let (whole, absent) = values.split_at(values.len() / 4 * 3);
+            let wanted: Vec<_> =
+                frames.iter().flatten().flat_map(|aabb| [aabb.min, aabb.max].concat()).collect();
+            assert_eq!((whole, rest.len()), (&wanted[..], 0));
+            assert!(absent.len() * 3 == whole.len() && absent.iter().all(|x| x.is_nan()));
+        }
+        std::fs::remove_file(&file).expect("removed");
+    }
 }

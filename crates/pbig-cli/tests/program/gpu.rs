@@ -101,7 +101,17 @@ fn a_required_gpu_that_is_missing_is_a_failure_without_output() {
         let line = String::from_utf8_lossy(&output.stderr);
         assert_eq!(line, "pbig: --require-gpu: a search with --with or --mesh runs on the CPU\n");
         assert!(output.status.code() == Some(1) && !folder.path().join("out.csv").exists());
+        // No adapter is opened for it, so none is named.
+        let warned =
+            String::from_utf8(on_gpu(folder.path(), &command, &["-o", "out.csv"]).stderr).expect("UTF-8");
+        let warnings: Vec<_> = warned.lines().filter(|line| line.starts_with("warning: ")).collect();
+        assert!(matches!(warnings[..], [one] if one.contains("the CPU did work")), "{warned}");
     }
+    let args = ["pairs", "boxes.npy", "--backend", "gpu", "--require-gpu", "--adapter", "no such"];
+    let output = pbig(folder.path(), &args);
+    let line = String::from_utf8_lossy(&output.stderr);
+    assert!(line.starts_with("pbig: --require-gpu: --adapter no such: no GPU adapter named"), "{line}");
+    assert_eq!(output.status.code(), Some(1));
 }
 
 #[test]

@@ -135,7 +135,7 @@ struct NewRows<'a> {
     names: Option<&'a [u32]>,
     /// The place of the group's first row among all rows.
     first_id: u32,
-    /// Where each row lies in the pool of the group.
+    /// The place of each row in the group's pool.
     spans: &'a [Span],
     pool: &'a [u32],
 }

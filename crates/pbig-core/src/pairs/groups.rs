@@ -35,7 +35,7 @@ impl Grouping {
     }
 }
 
-/// Place and length of a row of pairs.
+/// Place and length of a row of pairs: among those of its group until they are compared, then among all.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) start: u32,
@@ -199,7 +199,7 @@ impl Groups {
         sorters
     }
 
-    /// Sorts a group: the `b` of each pair into `others`, row by row, and where each row lies among them.
+    /// Sorts a group: the `b` of each pair into `others`, row by row, and the place of each row in `others` into `spans`.
     pub(super) fn sort(&self, group: usize, sorter: &mut Sorter, spans: &mut [Span], others: &mut [u32]) {
         let first_id = self.grouping.ids_of(group).start as u32;
         let pairs = &self.pairs[self.range(group)];

@@ -52,7 +52,8 @@ fn place_of(
     }
     let wanted = name.or(named);
     let part = wanted.unwrap_or_default().to_lowercase();
-    let place = part.trim_start_matches("gpu ").parse::<usize>().ok().filter(|place| *place < names.len());
+    let place =
+        part.strip_prefix("gpu ").unwrap_or(&part).parse::<usize>().ok().filter(|place| *place < names.len());
     let by_name = || names.iter().position(|name| name.to_lowercase().contains(&part));
     place.or_else(by_name).ok_or_else(|| {
         let wanted = wanted.map(|name| format!(" named {name:?}")).unwrap_or_default();
