@@ -103,9 +103,11 @@ fn a_required_gpu_that_is_missing_is_a_failure_without_output() {
         assert!(output.status.code() == Some(1) && !folder.path().join("out.csv").exists());
         // No adapter is opened for it, so none is named.
         let warned =
-            String::from_utf8(on_gpu(folder.path(), &command, &["-o", "out.csv"]).stderr).expect("UTF-8");
-        let warnings: Vec<_> = warned.lines().filter(|line| line.starts_with("warning: ")).collect();
-        assert!(matches!(warnings[..], [one] if one.contains("the CPU did work")), "{warned}");
+            String::from_utf8(on_gpu(folder.path(), &command, &["-o", "cpu.csv"]).stderr).expect("UTF-8");
+        assert!(
+            warned.starts_with("pbig: warning: the CPU did work: ") && warned.lines().count() == 1,
+            "{warned}"
+        );
     }
     let args = ["pairs", "boxes.npy", "--backend", "gpu", "--require-gpu", "--adapter", "no such"];
     let output = pbig(folder.path(), &args);
