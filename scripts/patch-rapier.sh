@@ -116,7 +116,8 @@ if $is_undo; then
     [ -n "$lines" ] || lines="(no manifest names pbig's crates or a copy)"
     cat <<TEXT
 $did
-Remove pbig's calls from the code, and these lines from the manifests, with [patch.crates-io] if nothing is left in it:
+Remove pbig's calls from the code, and these lines from the manifests, with [patch.crates-io] if nothing is left in it; take Cargo.lock back
+from version control, so that cargo chooses no newer rapier:
 
 $lines
 TEXT

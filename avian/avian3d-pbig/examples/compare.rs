@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Your collision hooks, if you have any.
+/// Your collision hooks, if you have any; with lifetimes, `MyHooks<'static, 'static>`.
 type Hooks = ();
 
 /// Adds the scene. Put your own plugins, systems and bodies here, but no window and no `PhysicsPlugins`. What is random needs a seed.
