@@ -78,9 +78,12 @@ parser.add_argument("folder", type=pathlib.Path)
 parser.add_argument("--rounds", type=int, default=9)
 parser.add_argument("--radius", type=float, default=0.0)
 args = parser.parse_args()
+folders = sorted({path.parent for path in args.folder.resolve().rglob("*") if path.suffix in (".obj", ".ply")})
+if not folders or args.rounds < 1:
+    parser.error(f"no .obj or .ply below {args.folder}" if not folders else "--rounds is below 1")
 print(f"# cores: {os.cpu_count()}\n# ipctk: {importlib.metadata.version('ipctk')}\n# rounds: {args.rounds}")
 print("scene,faces,ipctk_pairs,pbig_pairs,ipctk_median_ms,pbig_median_ms,ipctk_slowest_ms,pbig_slowest_ms")
-for folder in sorted({path.parent for path in args.folder.resolve().rglob("*") if path.suffix in (".obj", ".ply")}):
+for folder in folders:
     frames = sorted(path for path in folder.iterdir() if path.suffix in (".obj", ".ply"))
     assert len(frames) == 2, f"{folder}: {len(frames)} frames, not two"
     (before, faces), (after, later) = map(read, frames)

@@ -91,7 +91,9 @@ pub(crate) fn search_text(error: &Error) -> String {
     let way_out = "for more, use the crate pbig-core with larger `Limits`";
     match error {
         Error::TooManyBoxes { boxes, limit } => format!("{boxes} boxes are more than {limit}; {way_out}"),
-        Error::TooManyPairs { limit } => format!("more than {limit} overlapping pairs; {way_out}"),
+        Error::TooManyPairs { limit } => {
+            format!("more than {limit} overlapping pairs, perhaps by a large margin; {way_out}")
+        }
         other => other.to_string(),
     }
 }

@@ -33,7 +33,7 @@ def vertices(name: str, values: ArrayLike) -> NDArray[np.float64]:
     if array.ndim == 0:
         raise ValueError(f"{name} is one number; give vertices, shape (n, 3); a margin is given as margin={array}")
     if array.shape[1:] != (3,):
-        raise _wrong_shape(name, array, "(n, 3), with the xyz of a vertex in a row; in 2D add a column of zeros")
+        raise _wrong_shape(name, array, "(n, 3), with the xyz of a vertex in a row; in 2D add a column of zeros, and ask for elements='ee,ev'")
     _check_rows(name, array)
     _float_type(name, array)
     with np.errstate(invalid="ignore"):
