@@ -76,7 +76,7 @@ def edges(values: ArrayLike, vertex_count: int) -> NDArray[np.uint32]:
 
 def warn_of_invalid(name: str, rows: NDArray[Any]) -> None:
     """Warns of boxes that pair with nothing."""
-    are_valid = (rows[:, :3] <= rows[:, 3:]).all(axis=1)
+    are_valid = np.logical_and.reduce(rows[:, :3] <= rows[:, 3:], axis=1)
     _warn(name, ~are_valid, "with a NaN or a minimum above its maximum", "they pair with nothing; a row is min xyz, max xyz")
 
 
