@@ -128,8 +128,8 @@ run_publish() {
         --target-dir "$(target_folder)/publish"
 }
 
-# run_module NAME [VARIABLE]: builds the module in this environment, and runs it.
-run_module() {
+# wasm_module NAME [VARIABLE]: builds the module in this environment, and runs it.
+wasm_module() {
     echo "== WebAssembly $1"
     # Slower code of rapier has the same results, and compiles sooner.
     step env RUSTFLAGS= ${2:+"$2"} "${cargo[@]}" build --locked --quiet --profile wasm --lib --package pbig-wasm \
@@ -147,8 +147,8 @@ run_wasm() {
     mkdir -p "$folder"
     printf '#!/bin/sh\nexec "$@" -C target-feature=+simd128\n' >"$folder/rustc-simd"
     chmod +x "$folder/rustc-simd"
-    run_module "without SIMD"
-    run_module "with SIMD" RUSTC_WORKSPACE_WRAPPER="$folder/rustc-simd"
+    wasm_module "without SIMD"
+    wasm_module "with SIMD" RUSTC_WORKSPACE_WRAPPER="$folder/rustc-simd"
 }
 
 # elsewhere TARGET LINKER RUNNER...: tests for another system, whose programs RUNNER runs.

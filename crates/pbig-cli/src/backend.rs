@@ -32,8 +32,12 @@ impl BackendArgs {
     /// Returns a finder for two sets or a mesh, which no device searches.
     pub(crate) fn finder_on_cpu(&self) -> Result<Finder, Failure> {
         self.check_options()?;
+        let why = "a search with --with or --mesh runs on the CPU";
         if self.require_gpu {
-            return Err(required("a search with --with or --mesh runs on the CPU"));
+            return Err(required(why));
+        }
+        if self.adapter.is_some() {
+            return Err(Failure::Input(format!("--adapter: {why}")));
         }
         Ok(Finder::new(Config { backend: self.kind.backend(), ..Config::DEFAULT }))
     }

@@ -140,6 +140,7 @@ fn object(candidates: &[Candidate], chosen: &Chosen, tested: &[Tested]) -> serde
             "error": one.opened.as_ref().err().map(ToString::to_string),
             "max_buffer_bytes": limits.max_buffer_size,
             "max_binding_bytes": limits.max_storage_buffer_binding_size,
+            "max_boxes": max_boxes(&limits),
         })
     };
     let test =
@@ -159,6 +160,11 @@ fn object(candidates: &[Candidate], chosen: &Chosen, tested: &[Tested]) -> serde
     })
 }
 
+/// Returns the number of boxes that fit a buffer of an adapter.
+fn max_boxes(limits: &wgpu::Limits) -> u64 {
+    limits.max_storage_buffer_binding_size / size_of::<Aabb>() as u64
+}
+
 /// Describes an adapter and its limits, and says why it cannot be used.
 fn describe((i, Candidate { adapter, opened, is_used }): (usize, &Candidate)) -> String {
     let (info, limits) = (adapter.get_info(), adapter.limits());
@@ -173,7 +179,7 @@ fn describe((i, Candidate { adapter, opened, is_used }): (usize, &Candidate)) ->
         info.driver_info,
         mib(limits.max_buffer_size),
         mib(limits.max_storage_buffer_binding_size),
-        limits.max_storage_buffer_binding_size / size_of::<Aabb>() as u64,
+        max_boxes(&limits),
         limits.max_storage_buffers_per_shader_stage,
         limits.max_compute_invocations_per_workgroup,
         limits.max_compute_workgroup_storage_size >> 10,

@@ -43,7 +43,7 @@ fn verdict(searches: &Table, device: &str) -> String {
     let most = slower.iter().filter_map(boxes).fold(0.0, f64::max);
     match faster.iter().filter_map(boxes).find(|boxes| *boxes > most) {
         Some(boxes) => format!("The {device} is faster from {boxes} boxes on."),
-        None if faster.is_empty() => "The CPU was faster at every size.".into(),
+        None if faster.is_empty() => format!("The CPU was faster than this {device} at every size."),
         None => format!("The {device} was faster in {} of {} cases.", faster.len(), searches.rows.len()),
     }
 }
@@ -154,7 +154,7 @@ mod tests {
         };
         assert_eq!(of([0.1, 2.0, 1.5, 3.0].map(Some)), "The GPU is faster from 100000 boxes on.");
         assert_eq!(of([2.0; 4].map(Some)), "The GPU is faster from 1000 boxes on.");
-        assert_eq!(of([0.1; 4].map(Some)), "The CPU was faster at every size.");
+        assert_eq!(of([0.1; 4].map(Some)), "The CPU was faster than this GPU at every size.");
         assert_eq!(of([Some(0.1), Some(2.0), Some(3.0), None]), "The GPU was faster in 2 of 4 cases.");
     }
 }

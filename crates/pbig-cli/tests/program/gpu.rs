@@ -101,6 +101,10 @@ fn a_required_gpu_that_is_missing_is_a_failure_without_output() {
         let line = String::from_utf8_lossy(&output.stderr);
         assert_eq!(line, "pbig: --require-gpu: a search with --with or --mesh runs on the CPU\n");
         assert!(output.status.code() == Some(1) && !folder.path().join("out.csv").exists());
+        refused(
+            &on_gpu(folder.path(), &command, &["--adapter", "0"]),
+            &["--adapter: a search with --with or --mesh"],
+        );
         // No adapter is opened for it, so none is named.
         let warned =
             String::from_utf8(on_gpu(folder.path(), &command, &["-o", "cpu.csv"]).stderr).expect("UTF-8");

@@ -38,8 +38,8 @@ pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter> {
     Ok(all[place].clone())
 }
 
-/// Returns the place of the wanted adapter, or what was wanted and found. It is wanted by its place, such as `1` or `gpu 1`, or by a
-/// part of its name, in any case; the first with that part counts. `api` and `named` are the values of `WGPU_BACKEND` and
+/// Returns the place of the wanted adapter, or what was wanted and found. It is wanted by its place, such as `1` or `gpu 1`, or by
+/// another part of its name, in any case; the first with that part counts. `api` and `named` are the values of `WGPU_BACKEND` and
 /// `WGPU_ADAPTER_NAME`.
 fn place_of(
     name: Option<&str>,
@@ -52,10 +52,14 @@ fn place_of(
     }
     let wanted = name.or(named);
     let part = wanted.unwrap_or_default().to_lowercase();
-    let place =
-        part.strip_prefix("gpu ").unwrap_or(&part).parse::<usize>().ok().filter(|place| *place < names.len());
-    let by_name = || names.iter().position(|name| name.to_lowercase().contains(&part));
-    place.or_else(by_name).ok_or_else(|| {
+    let number = part.strip_prefix("gpu ").unwrap_or(&part);
+    // Longer numbers, such as 4090, are parts of names.
+    let place = if matches!(number.len(), 1 | 2) && number.bytes().all(|byte| byte.is_ascii_digit()) {
+        number.parse().ok().filter(|place| *place < names.len())
+    } else {
+        names.iter().position(|name| name.to_lowercase().contains(&part))
+    };
+    place.ok_or_else(|| {
         let wanted = wanted.map(|name| format!(" named {name:?}")).unwrap_or_default();
         let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
         let cause = match api {
@@ -93,9 +97,10 @@ mod tests {
         let names = ["Iris Xe", "llvmpipe (LLVM 15)"].map(str::to_owned);
         let of_call = [None, Some("xe"), Some("LLVMPIPE")].map(|name| place_of(name, None, None, &names));
         assert_eq!(of_call, [Ok(0), Ok(0), Ok(1)]);
-        // No place 15: the name has it.
-        let of_place = ["0", "gpu 1", "15"].map(|name| place_of(Some(name), None, None, &names));
-        assert_eq!(of_place, [Ok(0), Ok(1), Ok(1)]);
+        // A short number is no part of a name.
+        let of_place = ["0", "gpu 1", "15", "2"].map(|name| place_of(Some(name), None, None, &names).ok());
+        assert_eq!(of_place, [Some(0), Some(1), None, None]);
+        assert_eq!(place_of(Some("4090"), None, None, &["A".into(), "RTX 4090".into()]), Ok(1));
         assert_eq!(place_of(None, None, Some("llvm"), &names), Ok(1), "the variable's");
         assert_eq!(place_of(Some("iris"), None, Some("llvm"), &names), Ok(0), "the call's comes first");
         assert_eq!(place_of(None, Some("vulkan"), None, &names), Ok(0));

@@ -115,7 +115,7 @@ impl Session {
     /// Waits for copies, and gives the bytes to `take` where they lie.
     pub(super) async fn receive<T>(
         &mut self,
-        Fetch { staging, bytes, submission }: Fetch,
+        Fetch { staging, bytes, submission, submitting }: Fetch,
         take: impl FnOnce(&mut Self, &[u8]) -> Result<T>,
     ) -> Result<T> {
         let (mut clock, device) = (Clock::start(), self.storage.device.clone());
@@ -123,7 +123,7 @@ impl Session {
         let patience = self.storage.options.patience.saturating_mul(submissions);
         wait::map(&device, &staging, bytes, submission, patience).await?;
         let report = &mut self.found.report;
-        report.wait += clock.lap();
+        report.wait += submitting + clock.lap();
         (report.waits, report.downloaded) = (report.waits + 1, report.downloaded + bytes);
         device.read(&staging, bytes, |bytes| take(self, bytes))?
     }

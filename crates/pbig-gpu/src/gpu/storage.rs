@@ -7,11 +7,12 @@ use crate::GpuOptions;
 use crate::layout::{BOX_BYTES, Chunk, halves};
 use crate::policy::MAX_BOXES;
 use bytemuck::Pod;
-use pbig_core::internal::{self as parallel, threads_for};
+use pbig_core::internal::{self as parallel, Clock, threads_for};
 use pbig_shaders::{Buffer, Kernel};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use wgpu::CommandEncoder;
 
 /// Calls after which a buffer is freed if none of them used a quarter of it.
@@ -83,6 +84,8 @@ pub(super) struct Fetch {
     pub(super) staging: wgpu::Buffer,
     pub(super) bytes: u64,
     pub(super) submission: wgpu::SubmissionIndex,
+    /// Time of submitting the copies: a software adapter works meanwhile.
+    pub(super) submitting: Duration,
 }
 
 #[derive(Debug)]
@@ -240,7 +243,9 @@ impl Storage {
         self.ensure(staging, bytes)?;
         let (staging, mut encoder) = (self.get(staging).clone(), self.device.encoder());
         copy(self, &mut encoder, &staging);
-        Ok(Fetch { staging, bytes, submission: self.device.submit(encoder) })
+        let mut clock = Clock::start();
+        let submission = self.device.submit(encoder);
+        Ok(Fetch { staging, bytes, submission, submitting: clock.lap() })
     }
 
     pub(super) fn bind_group(
