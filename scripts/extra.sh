@@ -122,7 +122,7 @@ run_publish() {
     check_interface $options
     # Each is built from its package, against the others' packages; by the oldest Rust, if it is there.
     # Cargo keeps what it has unpacked in an earlier dry run from the same folder, and would build against that.
-    rm -rf "${CARGO_HOME:-$HOME/.cargo}"/registry/{src,cache}/-*/{pbig,rapier-pbig}-* 2>/dev/null || true
+    rm -rf "${CARGO_HOME:-$HOME/.cargo}"/registry/{src,cache}/-*/{pbig,rapier-pbig}-* "$(target_folder)/publish/package" 2>/dev/null || true
     toolchain=$(oldest)
     step env $toolchain CARGO_PROFILE_DEV_DEBUG=false cargo publish --dry-run --locked --allow-dirty $options \
         --target-dir "$(target_folder)/publish"

@@ -113,8 +113,9 @@ fn a_hung_device_costs_the_patience_once() {
     let boxes = set("pile", 20_000);
     let request = SearchRequest { boxes: &boxes, filters: None, is_sorted: true, max_pairs: u64::MAX };
     let why = "the device did not answer within 1ns (GpuOptions::patience)";
-    let result = gpu.find_all(&request, &mut DeviceFound::default());
-    assert_eq!(result, Err(DeviceFailure::Failed(why.into())));
+    // A software device may be done when the wait begins.
+    let mut results = (0..100).map(|_| gpu.find_all(&request, &mut DeviceFound::default()));
+    assert_eq!(results.find(Result::is_err), Some(Err(DeviceFailure::Failed(why.into()))));
 }
 
 /// Contract: a device of the app that was busy for too long is lost for that call only.
@@ -125,14 +126,16 @@ fn an_apps_device_that_was_busy_is_used_again_when_it_is_idle() {
     let config = Config { backend: Backend::Device, ..Config::DEFAULT };
     let usual = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
     let no_time = GpuOptions { patience: Duration::ZERO, ..usual };
-    let mut finder = Finder::with_device(config, Box::new(Hardware(finder, vec![usual, no_time])));
+    // A software device may be done when the wait begins, so there are several calls without time.
+    let options = [vec![usual], vec![no_time; 50]].concat();
+    let mut finder = Finder::with_device(config, Box::new(Hardware(finder, options)));
     let boxes = set("pile", 20_000);
     let wanted = on_cpu(&boxes);
     let mut call = || {
         assert_eq!(difference(finder.find(&boxes).expect("few pairs"), &wanted), None);
         finder.report().fallback.clone()
     };
-    let why = call().expect("it had no time");
+    let why = (0..50).find_map(|_| call()).expect("it had no time");
     assert!(why.contains("did not answer"), "{why}");
     // The device may be busy yet: a software one compiles kernels for seconds.
     call();
